@@ -217,6 +217,10 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--max-images", arguments->dataset.max_frames, "replay: end after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--laps", arguments->laps, "replay: play the recording this often")->check(CLI::PositiveNumber);
+  command
+      ->add_option("--pair-tolerance", arguments->dataset.pair_tolerance_ms,
+                   "ms by which the stamps of images that are taken at once may differ")
+      ->check(CLI::Range(0.0, 1000.0));
   command->add_flag("--preload", arguments->preload, "replay: decode all images before the clock starts");
   command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");

@@ -12,56 +12,13 @@ import time
 import depthai as dai
 import numpy
 
+from lens_fit import WORST_FIT_PX, fitted_equidistant
 from sensor_bridge import EQUIDISTANT, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes
 
 WIDTH, HEIGHT, IMAGE_HZ, IMU_HZ = 640, 400, 30, 200
 CAMERAS = (dai.CameraBoardSocket.CAM_B, dai.CameraBoardSocket.CAM_C)  # left and right
 IMU_NOISE = (1.22e-4, 1.9393e-5, 1.57e-3, 3.0e-3)  # densities from the BMI270's data sheet, random walks assumed
-WORST_FIT_PX = 0.5  # of the lens model, root mean square
 SILENT_S = 3
-
-
-def device_pixels(k, rays):
-    """Pixels of rays (x, y on the plane z = 1) in units of the focal length, by the rational model of 14 coefficients."""
-    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (list(k) + [0.0] * 14)[:12]
-    x, y = rays[:, 0], rays[:, 1]
-    r2 = x * x + y * y
-    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-    return numpy.stack([x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + s1 * r2 + s2 * r2 * r2,
-                        y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + s3 * r2 + s4 * r2 * r2], axis=1)
-
-
-def equidistant_pixels(lens, rays):
-    """lens: fx, fy, cx, cy, k1 to k4."""
-    r = numpy.maximum(numpy.hypot(rays[:, 0], rays[:, 1]), 1e-12)
-    a = numpy.arctan(r)
-    bent = a * (1 + a**2 * (lens[4] + a**2 * (lens[5] + a**2 * (lens[6] + a**2 * lens[7])))) / r
-    return lens[:2] * (rays * bent[:, None]) + lens[2:4]
-
-
-def rays_in_view(K, k):
-    """Rays of a grid that the device's model maps into the image, where it is one to one, and their pixels."""
-    u = numpy.linspace(-2, 2, 161)
-    rays = numpy.stack(numpy.meshgrid(u, u), axis=2).reshape(-1, 2)
-    outwards = numpy.stack([(device_pixels(k, share * rays) * rays).sum(axis=1) for share in numpy.linspace(0, 1, 41)])
-    grows = (numpy.diff(outwards, axis=0) >= 0).all(axis=0)
-    bent = device_pixels(k, rays)
-    pixels = bent * (K[0, 0], K[1, 1]) + (K[0, 2], K[1, 2])
-    inside = grows & (pixels >= 0).all(axis=1) & (pixels[:, 0] < WIDTH) & (pixels[:, 1] < HEIGHT)
-    return rays[inside], pixels[inside]
-
-
-def fitted_equidistant(K, k):
-    """The equidistant lens next to the device's rational model, of which the estimator has no counterpart: (lens, error in px)."""
-    rays, pixels = rays_in_view(K, k)
-    lens = numpy.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], 0, 0, 0, 0], float)
-    for _ in range(20):
-        error = (equidistant_pixels(lens, rays) - pixels).ravel()
-        steps = numpy.diag([1e-3] * 4 + [1e-6] * 4)
-        J = numpy.stack([(equidistant_pixels(lens + d, rays) - pixels).ravel() - error for d in steps], axis=1) / numpy.diag(steps)
-        lens = lens - numpy.linalg.lstsq(J, error, rcond=None)[0]
-    error = equidistant_pixels(lens, rays) - pixels
-    return lens, float(numpy.sqrt((error**2).sum(axis=1).mean()))
 
 
 def camera(calibration, which):
@@ -71,7 +28,7 @@ def camera(calibration, which):
     if calibration.getDistortionModel(which) == dai.CameraModel.Fisheye:
         lens = [K[0, 0], K[1, 1], K[0, 2], K[1, 2], *k[:4]]
     else:
-        lens, error_px = fitted_equidistant(K, k)
+        lens, error_px = fitted_equidistant(K, k, WIDTH, HEIGHT)
         if not error_px < WORST_FIT_PX:
             sys.exit(f"{which.name}: no lens model of four coefficients fits the device's to {WORST_FIT_PX} px ({error_px:.2f}); "
                      "calibrate with `fbvins calibrate`, and give `fbvins live` the file")
@@ -87,6 +44,13 @@ def rig(calibration, image_hz):
 def stamp_ns(moment):
     """Of the library's clock, which is this machine's, for images and readings alike."""
     return round(moment.total_seconds() * 1e6) * 1000
+
+
+def facts(device, image_hz):
+    """What `fbvins live --check` judges (docs/socket.md)."""
+    speed = {"HIGH": "2.0", "SUPER": "3.0", "SUPER_PLUS": "3.1"}
+    return {"model": device.getDeviceName(), "usb": speed.get(device.getUsbSpeed().name), "driver": "user space", "clock": "global",
+            "emitter": "off", "mode": f"{WIDTH}x{HEIGHT}@{image_hz:g}"}
 
 
 def build(pipeline, image_hz):
@@ -128,6 +92,7 @@ def fly(device, path, image_hz):
     for switch_off in (device.setIrLaserDotProjectorIntensity, device.setIrFloodLightIntensity):
         switch_off(0)
     link = Link(path, WIDTH, HEIGHT, rig(device.readCalibration(), image_hz), "OAK bridge")
+    link.describe(facts(device, image_hz))
     with dai.Pipeline(device) as pipeline:
         images, motion = build(pipeline, image_hz)
         streams = Streams(link)

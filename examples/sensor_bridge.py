@@ -13,10 +13,11 @@ import threading
 import numpy
 
 SLOTS = 16
-SAME_INSTANT_NS = 2_000_000  # stamps of a pair differ by at most this
+SAME_INSTANT_NS = 3_000_000  # stamps of a pair differ by at most this, as in recordings
 LONGEST_WAIT = 4  # images of one camera without any of the other
 PATIENCE_S = 2  # of a connection: longer silence or blocking means that it is dead
 LONGEST_STEP_NS = 50_000_000  # between two readings of the accelerometer
+RIG_BYTES = 392
 RADTAN, EQUIDISTANT = 0, 1  # FbvinsSocketCamera::model
 
 
@@ -36,44 +37,61 @@ def message(kind, body):
 
 class StereoPairs:
     """Pairs two cameras' images by their stamps, by the rule of src/fbvins/live/frame_joiner.hpp: an image whose partner is lost leaves
-    alone as soon as that is certain."""
+    alone as soon as that is certain; a right one that is too far from a left one to be its partner, and nearer than half an interval, is
+    dropped."""
 
     def __init__(self):
-        self.waiting, self.pairs, self.alone, self.nearest_ns = (collections.deque(), collections.deque()), 0, 0, None
+        self.waiting, self.pairs, self.alone, self.dropped, self.nearest_ns = (collections.deque(), collections.deque()), 0, 0, 0, None
+        self.left_stamps, self.last_left = collections.deque(maxlen=3), None
 
     def add(self, camera, t_ns, image):
         """camera: 0 left, 1 right. After it, next() until that is None."""
         own = self.waiting[camera]
-        if not own or t_ns > own[-1][0]:
-            own.append((t_ns, image))
+        if own and t_ns <= own[-1][0]:
+            return
+        own.append((t_ns, image))
+        if camera == 0:
+            self.left_stamps.append(t_ns)
+
+    def is_stray(self, t_ns):
+        """Whether a right image alone is too near to a left one to be another moment."""
+        stamps = list(self.left_stamps)
+        interval = min((b - a for a, b in zip(stamps, stamps[1:])), default=0)  # a lost image makes one interval as long as two
+        return any(2 * abs(t_ns - left) <= interval for left in (self.last_left, *(t for t, _ in list(self.waiting[0])[:1])) if left is not None)
 
     def next(self):
         """(stamp, left, right), one of the images None where it is lost."""
         left, right = self.waiting
         if left and right and abs(right[0][0] - left[0][0]) <= SAME_INSTANT_NS:
             self.pairs += 1
+            self.last_left = left[0][0]
             return left[0][0], left.popleft()[1], right.popleft()[1]
         for camera, own, other in ((0, left, right), (1, right, left)):
             if own and (own[0][0] < other[0][0] if other else len(own) >= LONGEST_WAIT):
                 t_ns, image = own.popleft()
-                self.alone += 1
                 if other:
                     self.nearest_ns = min(self.nearest_ns or other[0][0] - t_ns, other[0][0] - t_ns)
+                if camera == 1 and self.is_stray(t_ns):
+                    self.dropped += 1
+                    return self.next()
+                self.alone += 1
+                self.last_left = t_ns if camera == 0 else self.last_left
                 return t_ns, *((image, None), (None, image))[camera]
         return None
 
     def report(self):
         """What is wrong since the last report, or None."""
-        pairs, alone, nearest_ns = self.pairs, self.alone, self.nearest_ns
-        self.pairs, self.alone, self.nearest_ns = 0, 0, None
-        if alone == 0:
+        pairs, alone, dropped, nearest_ns = self.pairs, self.alone, self.dropped, self.nearest_ns
+        self.pairs, self.alone, self.dropped, self.nearest_ns = 0, 0, 0, None
+        if alone + dropped == 0:
             return None
         apart = "" if nearest_ns is None else f"; the other camera's next image was at least {nearest_ns / 1e6:.3f} ms later"
-        return f"{alone} images without their partner, {pairs} pairs{apart}"
+        return f"{alone} images without their partner, {dropped} dropped, {pairs} pairs{apart}"
 
 
 class Sender:
-    """One connection: sends hello, readings and frames; receives which slots are free again."""
+    """One connection: sends hello, readings and frames; receives which slots are free again. Without a calibration (empty) the
+    estimator must have one."""
 
     def __init__(self, path, width, height, calibration, name="sensor bridge"):
         self.size, self.sequence, self.lock = width * height, 0, threading.Lock()
@@ -86,8 +104,8 @@ class Sender:
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             self.connection.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", PATIENCE_S, 0))
         self.connection.connect(path)
-        hello = struct.pack("<8sHHI32s6I", b"fb-vins", 1, 4, 1, name.encode(), width, height, SLOTS, 2 * self.size, self.size, 0)
-        socket.send_fds(self.connection, [message(1, hello + calibration)], [memory])
+        hello = struct.pack("<8sHHI32s6I", b"fb-vins", 1, 4, bool(calibration), name.encode(), width, height, SLOTS, 2 * self.size, self.size, 0)
+        socket.send_fds(self.connection, [message(1, hello + (calibration or bytes(RIG_BYTES)))], [memory])
         os.close(memory)
         while self.hear(0) != 65:  # welcome
             pass

@@ -30,6 +30,7 @@ except ImportError:
     sys.modules["depthai"].CameraBoardSocket = sockets
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "examples"))
+import lens_fit  # noqa: E402
 import oak_bridge as bridge  # noqa: E402
 
 K = numpy.array([[399.0, 0, 322.5], [0, 398.5, 201.3], [0, 0, 1]])
@@ -41,15 +42,15 @@ BASELINE_M = 0.075
 def lens():
     """A rational lens and a straight one, by the equidistant one within a fraction of a pixel."""
     for k in (RATIONAL, PLAIN):
-        rays, pixels = bridge.rays_in_view(K, k)
+        rays, pixels = lens_fit.rays_in_view(K, k, bridge.WIDTH, bridge.HEIGHT)
         assert pixels[:, 0].min() < 25 and pixels[:, 0].max() > 615 and pixels[:, 1].min() < 25 and pixels[:, 1].max() > 375
-        fitted, error_px = bridge.fitted_equidistant(K, k)
+        fitted, error_px = lens_fit.fitted_equidistant(K, k, bridge.WIDTH, bridge.HEIGHT)
         assert error_px < 0.2, (k, error_px)
-        apart = numpy.hypot(*(bridge.equidistant_pixels(fitted, rays) - pixels).T)
+        apart = numpy.hypot(*(lens_fit.equidistant_pixels(fitted, rays) - pixels).T)
         assert apart.max() < 1, apart.max()
         print(f"  lens of {sum(c != 0 for c in k)} coefficients: {error_px:.3f} px, at most {apart.max():.2f}")
     beyond = [-0.9] + [0.0] * 13  # turns back within the image: what lies beyond is left out
-    rays, _ = bridge.rays_in_view(K, beyond)
+    rays, _ = lens_fit.rays_in_view(K, beyond, bridge.WIDTH, bridge.HEIGHT)
     assert numpy.hypot(*rays.T).max() < 0.62, numpy.hypot(*rays.T).max()
 
 

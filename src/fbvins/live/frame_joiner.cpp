@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/frame_joiner.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
@@ -8,15 +10,12 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kSameInstant{2'000'000};
 constexpr std::size_t kLongestWait = 4;  // images of one camera without any of another
 /// A camera is silent when none of its images came for so many of its periods, beyond its usual lag. One lost image is no
 /// silence, nor are two that come in one burst after another camera's two.
 constexpr double kSilentPeriods = 2.5;
 /// And one that never delivered, this long after the first image of another.
 constexpr Duration kLongestStart{1'000'000'000};
-
-bool are_one_instant(Time a, Time b) { return std::abs((a - b).ns) <= kSameInstant.ns; }
 
 void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Image> image) {
   if (camera >= 2 && frame.more.size() < camera - 1) frame.more.resize(camera - 1);
@@ -25,18 +24,22 @@ void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Imag
 
 }  // namespace
 
+bool FrameJoiner::are_one_instant(Time a, Time b) const { return std::abs((a - b).ns) <= tolerance_.ns; }
+
 void FrameJoiner::put(std::size_t stream, Time stamp, Pixels pixels) {
   Stream& to = streams_[stream];
   const Time t = stamp + own_.of(static_cast<int>(stream));
   if (to.newest && t <= *to.newest) return;
+  to.before = to.interval;
   if (to.newest) to.interval = t - *to.newest;
   to.period.add(to.interval);
   to.newest = t;
   began_ = began_.value_or(t);
   now_ = std::max(now_.value_or(t), t);
   to.lag = std::max(*now_ - t, Duration{to.lag.ns - to.lag.ns / 16});
-  const bool too_late = delivered_ && t <= *delivered_ + kSameInstant;
+  const bool too_late = delivered_ && t <= *delivered_ + tolerance_;
   if (!too_late || is_free(to)) to.waiting.push_back({t, std::move(pixels)});
+  else ++dropped_;
 }
 
 bool FrameJoiner::is_silent(const Stream& stream) const {
@@ -144,9 +147,37 @@ std::optional<StereoFrame> FrameJoiner::next_by_exposure() {
     if (!is_complete(*first)) return std::nullopt;
     count_apart(*first);
     StereoFrame frame = join(*first);
-    if (!frame.without_images()) return frame;
+    if (frame.without_images()) continue;
+    if (!is_stray(frame)) return counted(std::move(frame));
+    ++dropped_;
   }
-  return of_a_free_one();
+  if (auto frame = of_a_free_one()) return counted(*std::move(frame));
+  return std::nullopt;
+}
+
+/// Whether a frame without camera 0 is too near to one of camera 0 to be another moment.
+bool FrameJoiner::is_stray(const StereoFrame& frame) const {
+  if (frame.left) return false;
+  const Stream& zero = streams_.front();
+  // A lost image makes one interval as long as two.
+  const Duration interval = zero.before.ns > 0 ? std::min(zero.interval, zero.before) : zero.interval;
+  const auto is_near = [&](Time t) { return 2 * std::abs((t - frame.t).ns) <= interval.ns; };
+  return (last_zero_ && is_near(*last_zero_)) || (!zero.waiting.empty() && is_near(zero.waiting.front().t));
+}
+
+StereoFrame FrameJoiner::counted(StereoFrame frame) {
+  bool whole = true;
+  for (int i = 0; i < cameras_; ++i) whole &= frame.image(i) != nullptr;
+  ++(whole ? whole_ : parts_);
+  if (frame.left) last_zero_ = frame.t;
+  return frame;
+}
+
+std::string FrameJoiner::report() const {
+  if (parts_ + dropped_ == 0) return {};
+  return fmt::format(
+      "{} frames with the images of all cameras; {} with those of some, {} images dropped, without partner within {} ms", whole_,
+      parts_, dropped_, 1e3 * tolerance_.seconds());
 }
 
 std::optional<StereoFrame> FrameJoiner::next() {

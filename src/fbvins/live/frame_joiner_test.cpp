@@ -14,6 +14,7 @@ class Pairs {
  public:
   void left(double tens) { add(0, tens); }
   void right(double tens) { add(1, tens); }
+  std::string report() const { return joiner_.report(); }
   std::string given;
 
  private:
@@ -60,7 +61,18 @@ TEST(FrameJoiner, StampsOfAPairMayDifferALittle) {
   Pairs p;
   for (int k = 1; k <= 5; ++k) p.left(k), p.right(k + 1.2e-4);  // 1.2 us later
   p.left(6), p.right(5.9), p.right(7.3), p.left(7);
-  EXPECT_EQ(p.given, "1 2 3 4 5 6 7L");
+  EXPECT_EQ(p.given, "1 2 3 4 5 6 7") << "3 ms, as in recordings";
+}
+
+TEST(FrameJoiner, WhatIsTooFarAndTooNearIsDroppedAndCounted) {
+  Pairs p;
+  p.left(1), p.right(1), p.left(2), p.right(2.4), p.left(3), p.right(3), p.right(3.6), p.left(4), p.left(5), p.right(5);
+  EXPECT_EQ(p.given, "1 2L 3 4L 5") << "neither 2.4 nor 3.6 is a moment of its own";
+  EXPECT_EQ(p.report(),
+            "3 frames with the images of all cameras; 2 with those of some, 2 images dropped, without partner within 3 ms");
+  Pairs good;
+  good.left(1), good.right(1);
+  EXPECT_EQ(good.report(), "");
 }
 
 TEST(FrameJoiner, WithoutACommonTriggerTheOffsetIsKept) {
@@ -227,7 +239,7 @@ TEST(FrameJoiner, DepthImagesGoWithTheirCamera) {
 
 TEST(FrameJoiner, StampsThatTheCalibrationExplainsAreOfOneInstant) {
   const ExposureOffsets own({{}, Duration{-8'000'000}, Duration{3'000'000}});
-  FrameJoiner joiner(3, false, own);
+  FrameJoiner joiner(3, false, Duration{3'000'000}, own);
   std::string given;
   const auto add = [&](int camera, int ms) {
     joiner.add(camera, Time{ms * std::int64_t{1'000'000}}, std::make_shared<Image>(1, 1));

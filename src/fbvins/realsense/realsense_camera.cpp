@@ -157,6 +157,11 @@ Duration RealsenseCamera::silence() {
   return host_now() - heard_;
 }
 
+std::string RealsenseCamera::unpaired() {
+  const std::lock_guard lock(mutex_);
+  return pairs_.report();
+}
+
 DeviceFacts RealsenseCamera::facts() {
   const std::lock_guard lock(mutex_);
   const auto stereo = std::find_if(streams_.begin(), streams_.end(), [](const Stream& stream) { return stream.is_stereo; });
@@ -174,7 +179,8 @@ Result<void> RealsenseCamera::start(SensorInput& input) {
   {
     const std::lock_guard lock(mutex_);
     heard_ = host_now();
-    pairs_ = FrameJoiner(2), motion_ = MotionMerge();  // what it had before it stopped is of no use
+    pairs_ = FrameJoiner(2, false, wanted_.pair_tolerance),
+    motion_ = MotionMerge();  // what it had before it stopped is of no use
   }
   try {
     for (Stream& stream : streams_) {

@@ -30,6 +30,7 @@ Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2
 /// Size and rate of the images that are wanted; 0: whatever is nearest to 640 x 480 at 30 Hz.
 struct RealsenseMode {
   int width_px = 0, height_px = 0, rate_hz = 0;
+  Duration pair_tolerance{3'000'000};
 };
 
 /// What images say of themselves, where driver and firmware pass it on.
@@ -64,6 +65,8 @@ class RealsenseCamera {
   void stop();
   /// Since its start or its last image, on this machine's clock.
   Duration silence();
+  /// Of the images since its start, FrameJoiner::report(); after stop().
+  std::string unpaired();
   /// What is known of the device now; of one that is unplugged what can still be had.
   DeviceFacts facts();
 

@@ -31,7 +31,7 @@ RealsenseName parse_realsense_name(const std::string& text) {
   std::smatch found;
   if (!std::regex_match(text, found, kMode)) return {text, {}};
   const auto number = [&](std::size_t i) { return found[i].matched ? std::stoi(found[i]) : 0; };
-  return {found[1].str(), {number(2), number(3), number(4)}};
+  return {found[1].str(), {.width_px = number(2), .height_px = number(3), .rate_hz = number(4)}};
 }
 
 RealsenseSource::RealsenseSource(rs2::context context, std::string which, SourceOptions options)
@@ -57,6 +57,7 @@ Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(rs2::context cont
   const RealsenseName name = parse_realsense_name(which);
   std::unique_ptr<RealsenseSource> source(new RealsenseSource(std::move(context), name.which, options));
   source->mode_ = name.mode;
+  source->mode_.pair_tolerance = Duration::from_seconds(1e-3 * options.dataset.pair_tolerance_ms);
   if (Result<void> watched = source->watch(); !watched) return watched.error();
   if (Result<void> found = source->wait_for_first(); !found) return found.error();
   if (Result<void> known = source->set_rig(); !known) return known.error();
@@ -182,6 +183,7 @@ Result<void> RealsenseSource::run(SensorInput& input) {
       }
       keep_facts();
       camera_->stop();
+      if (const std::string unpaired = camera_->unpaired(); !unpaired.empty()) options_.say(unpaired);
       if (gone()) options_.say(fmt::format("RealSense {}: unplugged; it is waited for", name));
     }
     const std::lock_guard lock(mutex_);

@@ -88,6 +88,8 @@ Result<void> Ros2Source::run(SensorInput& input) {
       if (Result<void> looked = subscriber->look_around(); !looked) say_once(looked.error().message);
     std::this_thread::sleep_for(kLookPeriod);
   }
+  subscribers.clear();  // what they still deliver is counted, too
+  if (const std::string unpaired = joiner_.report(); !unpaired.empty()) say_once(unpaired);
   return {};
 }
 

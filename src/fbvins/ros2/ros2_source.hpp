@@ -45,7 +45,8 @@ class Ros2Source final : public Source {
         topics_(std::move(topics)),
         options_(std::move(options)),
         rig_(std::move(rig)),
-        joiner_(rig_.camera_count(), !topics_.depth.empty(), own_offsets(rig_)) {}
+        joiner_(rig_.camera_count(), !topics_.depth.empty(), Duration::from_seconds(1e-3 * options_.dataset.pair_tolerance_ms),
+                own_offsets(rig_)) {}
   void take_image(int camera, std::string_view bytes, const std::shared_ptr<const void>& keeper, SensorInput& input);
   void take_depth(std::string_view bytes, SensorInput& input);
   bool is_of(const RosImage& image, const std::string& topic, const Camera& camera);

@@ -57,7 +57,9 @@ Result<V4l2Devices> parse_v4l2_devices(const std::string& text) {
 }
 
 V4l2Source::V4l2Source(V4l2Devices devices, SourceOptions options, StereoRig rig)
-    : options_(std::move(options)), rig_(std::move(rig)), joiner_(rig_.camera_count(), false, own_offsets(rig_)) {
+    : options_(std::move(options)),
+      rig_(std::move(rig)),
+      joiner_(rig_.camera_count(), false, Duration::from_seconds(1e-3 * options_.dataset.pair_tolerance_ms), own_offsets(rig_)) {
   for (std::string& path : devices.cameras) cameras_.push_back({.path = std::move(path)});
 }
 
@@ -109,6 +111,7 @@ void V4l2Source::deliver_images(SensorInput& input) {
       if (watched[i + 1].revents != 0) take(i, input);
   }
   for (Opened& camera : cameras_) camera.device.reset();
+  if (const std::string unpaired = joiner_.report(); !unpaired.empty()) say(unpaired);
 }
 
 void V4l2Source::keep_open(Opened& camera) {
