@@ -9,6 +9,7 @@
 #include "fbvins/core/angle.hpp"
 #include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
+#include "fbvins/types/protection.hpp"
 
 namespace fbvins {
 namespace estimator_outage_test {
