@@ -193,18 +193,35 @@ def write_split(path, flight):
     (path / "metadata.yaml").write_text(re.sub(r"(relative_file_paths:)(\n *- .*)+", r"\1" + listed, metadata))
 
 
-def write_mcap(path, flight, encoding="cdr", **options):
+# As McapRecorder of depthai-sdk names what it writes of an OAK: components' names, ROS 1 messages in MCAP.
+OAK_TOPICS = dict(zip(TOPICS, ("/left/raw", "/right/raw"))) | {f"{topic}/compressed": f"/{side}/compressed" for topic, side in zip(TOPICS, ("left", "right"))} | {"/imu0": "/imu"}
+
+
+def write_mcap(path, flight, encoding="cdr", images="mono8", names=None, **options):
     with open(path, "wb") as stream:
         writer = McapWriter(stream, chunk_size=2 << 20, **options)
         writer.start(profile="ros2" if encoding == "cdr" else "ros1")
         channels = {}
-        for stamp, topic, kind, data in flight.messages():
+        for stamp, topic, kind, data in flight.messages(images):
+            topic = topic if names is None else names[topic]
             if topic not in channels:
                 name = kind if encoding == "cdr" else kind.replace("/msg/", "/")
                 definition = flight.store.generate_msgdef(kind, ros_version=2 if encoding == "cdr" else 1)[0]
                 schema = writer.register_schema(name, "ros2msg" if encoding == "cdr" else "ros1msg", definition.encode())
                 channels[topic] = writer.register_channel(topic, encoding, schema)
             writer.add_message(channels[topic], stamp, data, stamp)
+        writer.finish()
+
+
+def write_messages_of_depthai(path):
+    """As depthai 3 does beside its video: schemas of its own."""
+    with open(path, "wb") as stream:
+        writer = McapWriter(stream)
+        writer.start(profile="", library="depthai")
+        for topic, name in (("left", "dai.proto.img_frame.ImgFrame"), ("imu", "dai.proto.imu_data.IMUData")):
+            channel = writer.register_channel(topic, "protobuf", writer.register_schema(name, "protobuf", b""))
+            for k in range(20):
+                writer.add_message(channel, k * 10**8, b"\x08\x01", k * 10**8)
         writer.finish()
 
 
@@ -234,6 +251,10 @@ def check_what_cannot_be_run(program, folder, root):
     def refused(arguments, *words):
         done = subprocess.run([program, *map(str, arguments)], check=False, capture_output=True, text=True)
         assert done.returncode == 2 and all(word in done.stderr for word in words), f"{arguments}: {done.returncode} {done.stderr}"
+
+    write_messages_of_depthai(root / "depthai3.mcap")
+    for command in ("info", "run"):
+        refused([command, root / "depthai3.mcap"], "holds no images in messages of ROS", "left (dai.proto.img_frame.ImgFrame, protobuf)")
     flight = Flight(folder, get_typestore(Stores.ROS1_NOETIC), True)
     write_ros1(root / "tiff.bag", flight, encoding="tiff")
     sentence = "images encoded as 'tiff' cannot be read (none of 8 left images tried can be used)"
@@ -420,6 +441,8 @@ def write_all(root, folder):
     write_mcap(root / "lz4.mcap", two, compression=CompressionType.LZ4)
     write_mcap(root / "unchunked.mcap", two, compression=CompressionType.NONE, use_chunking=False, use_summary_offsets=False)
     write_mcap(root / "ros1.mcap", one, encoding="ros1", compression=CompressionType.ZSTD)
+    for images, name in (("mono8", "oak"), ("compressed", "oak_compressed")):
+        write_mcap(root / f"{name}.mcap", one, encoding="ros1", images=images, names=OAK_TOPICS)
     return sorted(p for p in root.iterdir() if p.name not in ("flight", "euroc"))
 
 

@@ -152,7 +152,7 @@ def is_checked(program, folder):
         while camera.link.sender is None:
             time.sleep(0.05)
         software.fly(8.5, silent=(2, 5))
-        said, _ = live.communicate(timeout=60)
+        said, _ = live.communicate(timeout=240)  # the doctor, on a busy machine
     finally:
         live.kill()
         over.set()

@@ -225,6 +225,12 @@ def _of_file(path: str) -> Trajectory:
     return truth
 
 
+def _as_truth(value: AnyTrajectory) -> AnyTrajectory:
+    """Of a folder of `fbvins run` that has a truth that one, of anything else itself."""
+    file = os.path.join(os.fspath(value), "ground_truth.csv") if isinstance(value, (str, os.PathLike)) else ""
+    return file if file and os.path.isfile(file) else value
+
+
 def _as_trajectory(value: AnyTrajectory, stamps: Optional[numpy.ndarray] = None) -> Trajectory:
     if isinstance(value, Trajectory):
         return value
@@ -252,10 +258,11 @@ def evaluate(truth: AnyTrajectory, estimate: AnyTrajectory, align: str = "se3", 
              interpolate: bool = False) -> Evaluation:
     """Absolute and relative errors of an estimate, as `fbvins eval` has them; they agree with evo.
 
-    Both: a Trajectory, a Run, a TUM or EuRoC file, a recording (its truth), a folder of `fbvins run`, evo's PoseTrajectory3D or PosePath3D, or arrays
+    Both: a Trajectory, a Run, a TUM or EuRoC file, a recording (its truth), a folder of `fbvins run` (as truth: that in it, where there is one), evo's PoseTrajectory3D or PosePath3D, or arrays
     (t, p, q): int64 (N,) ns, float64 (N, 3) m, float64 (N, 4) w first.
     align: "se3", "yaw", "sim3" or "none". interpolate: the truth interpolated at the estimate's stamps instead of its nearest pose.
     """
+    truth = _as_truth(truth)
     without_stamps = [hasattr(x, "positions_xyz") and not hasattr(x, "timestamps") for x in (truth, estimate)]
     if without_stamps[0]:
         compared = None if without_stamps[1] else _as_trajectory(estimate)

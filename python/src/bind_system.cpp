@@ -81,6 +81,7 @@ class PySystem {
       throw nb::value_error(fmt::format("offsets: the rig has {} cameras, not {}", rig_.camera_count(), offsets.size()).c_str());
     StereoFrame frame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right), std::move(further),
                       depth_of(depth, rig_)};
+    if (frame.without_images()) throw nb::value_error("left, right and more are all None: a frame has an image");
     for (std::size_t i = 0; i < offsets.size(); ++i)
       if (offsets[i] != 0) frame.offsets.set(static_cast<int>(i), Duration{offsets[i]});
     push(std::move(frame));

@@ -74,6 +74,7 @@ def test_truth_from_a_folder_and_from_evo(run, flight, tmp_path):
     assert fbvins.evaluate(flight, run).absolute_m.rmse == expected
     run.save(tmp_path)
     assert fbvins.evaluate(flight, tmp_path).absolute_m.rmse == pytest.approx(expected, abs=1e-8)  # files have nine digits
+    assert fbvins.evaluate(tmp_path, run).absolute_m.rmse == pytest.approx(expected, abs=1e-4), "the folder's truth, not its estimate"
     with pytest.raises(ValueError, match="holds no ground truth"):
         without = tmp_path / "without"
         subprocess.run(["cp", "-r", flight, without], check=True)

@@ -242,6 +242,8 @@ def test_what_a_recording_must_not_have_raises(flight):
         system.push_images(100, image, image)
     with pytest.raises(TypeError, match="t: a whole number is expected, not float"):
         system.push_images(1.5, image, image)
+    with pytest.raises(ValueError, match="all None"):
+        system.push_images(200, None, None)
     system.finish()
 
 

@@ -153,6 +153,7 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
       if (const auto point = pose_of(message->data, about.encoding, about.type)) out.ground_truth.push_back(*point);
     }
   }
+  out.strangers = bag.strangers();
   return out;
 }
 

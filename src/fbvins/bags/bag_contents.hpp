@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct BagContents {
   std::string camera_problem;                 ///< why the first unusable one cannot be used
   std::vector<BagTransform> transforms;       ///< the static ones
   std::vector<TrajectoryPoint> ground_truth;  ///< of the topic /ground_truth
+  std::set<std::string> strangers;            ///< topics that are no messages of ROS (BagReader::strangers)
   std::string rig;                            ///< of a bag that `fbvins convert` wrote: all of its calibration (rig_text.hpp)
 };
 

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,6 +65,8 @@ class BagReader {
   /// Those read so far.
   const std::vector<BagTopic>& topics() const { return topics_; }
   const BagDamage& damage() const { return damage_; }
+  /// Topics that are no messages of ROS, "TOPIC (TYPE, ENCODING)", of which nothing is read; of what was read so far.
+  const std::set<std::string>& strangers() const { return strangers_; }
 
   /// Before the first next(): only what was recorded in [from, to), counted from the file's first message, but also the first
   /// message of each topic, and static transforms.
@@ -88,6 +91,7 @@ class BagReader {
   }
 
   std::vector<BagTopic> topics_;
+  std::set<std::string> strangers_;
   BagDamage damage_;
 
  private:

@@ -41,7 +41,10 @@ class McapBag final : public BagReader {
  protected:
   std::optional<BagMessage> advance() override {
     while (const std::optional<McapMessage> message = reader_.next()) {
-      if (!is_message_of_ros(*message->channel)) continue;
+      if (!is_message_of_ros(*message->channel)) {
+        note_stranger(*message->channel);
+        continue;
+      }
       const MessagePlace place{message->chunk, message->offset, message->data.size()};
       if (!is_zstd(message->data)) return BagMessage{topic_of(*message->channel), message->log_time, message->data, place};
       Unpacked out = unpack("zstd", message->data, 0, std::move(unpacked_));
@@ -70,6 +73,11 @@ class McapBag final : public BagReader {
     return channel.message_encoding == "cdr" || channel.message_encoding == "ros1";
   }
 
+  void note_stranger(const McapChannel& channel) {
+    if (known_strangers_.insert(&channel).second)
+      strangers_.insert(fmt::format("{} ({}, {})", channel.topic, channel.schema_name, channel.message_encoding));
+  }
+
   std::size_t topic_of(const McapChannel& channel) {
     const auto [known, is_new] = numbers_.try_emplace(&channel);
     if (is_new)
@@ -81,6 +89,7 @@ class McapBag final : public BagReader {
   std::shared_ptr<const ByteSource> bytes_;
   McapReader reader_;
   std::map<const McapChannel*, std::size_t> numbers_;
+  std::set<const McapChannel*> known_strangers_;
   std::string kept_, message_;  ///< records of the compressed chunk that read() used last; a message outside of such
   std::uint64_t kept_at_ = 0;
   std::string unpacked_, read_;  ///< compressed messages that next() and read() returned last

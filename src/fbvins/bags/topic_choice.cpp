@@ -81,9 +81,15 @@ Error ask(const std::string& what, const std::vector<std::string>& topics, const
           fmt::format("{} ({}): say which {} with --topics {}", what, listed(topics), which, kTopicsOption)};
 }
 
+Error no_images(const BagContents& contents) {
+  if (contents.strangers.empty()) return {ErrorCode::unsupported, "holds no images"};
+  return {ErrorCode::unsupported, fmt::format("holds no images in messages of ROS; of other messages nothing is read: {}",
+                                              listed({contents.strangers.begin(), contents.strangers.end()}))};
+}
+
 Result<std::vector<std::string>> find_rig(const BagContents& contents) {
   const std::vector<std::string> all = image_topics(contents, false);
-  if (all.empty()) return Error{ErrorCode::unsupported, "holds no images"};
+  if (all.empty()) return no_images(contents);
   if (all.size() == 1) return all;
   const std::vector<TopicPair> pairs = pairs_by_words(all, kCameras);
   if (pairs.empty() && all.size() == 2) return all;
@@ -125,7 +131,7 @@ std::string camera_folder(const std::string& topic) {
 
 Result<std::vector<std::string>> find_all_cameras(const BagContents& contents) {
   const std::vector<std::string> all = image_topics(contents, false);
-  if (all.empty()) return Error{ErrorCode::not_found, "holds no images"};
+  if (all.empty()) return no_images(contents);
   if (std::ssize(all) > kMostCameras)
     return ask(fmt::format("has {} image topics, more than {}", all.size(), kMostCameras), all, "are the cameras'");
   for (std::size_t i = 1; i < all.size(); ++i)
