@@ -18,6 +18,7 @@
 #include "euroc_rig.hpp"  // put your calibration here
 
 static const uint32_t kWidth = 752, kHeight = 480, kImageBytes = kWidth * kHeight, kSlotBytes = 2 * kImageBytes, kSlots = 16;
+static const int64_t kPair_ns = 1000000;  // stamps of a pair
 static const int connection = socket(AF_UNIX, SOCK_SEQPACKET, 0);
 
 static void need(bool fact, const char* what) {
@@ -70,9 +71,10 @@ int main(int argc, char** argv) {
   need(hear(free_slots, 0), "no welcome");
 
   const std::string folder = argv[2];
-  std::ifstream readings(folder + "/imu0/data.csv"), images(folder + "/cam0/data.csv");
+  std::ifstream readings(folder + "/imu0/data.csv"), images(folder + "/cam0/data.csv"), right_images(folder + "/cam1/data.csv");
   FbvinsSocketFrame frame{};
-  readings.ignore(1000, '\n'), images.ignore(1000, '\n') >> frame.t_ns;
+  int64_t right_ns = 0;
+  readings.ignore(1000, '\n'), images.ignore(1000, '\n') >> frame.t_ns, right_images.ignore(1000, '\n') >> right_ns;
   const auto start = std::chrono::steady_clock::now() + std::chrono::seconds(1) - std::chrono::nanoseconds(frame.t_ns);
   const auto wait_until = [&](int64_t t_ns) { std::this_thread::sleep_until(start + std::chrono::nanoseconds(t_ns)); };
   std::thread imu_thread([&] {  // as in a device: readings do not wait for images
@@ -86,9 +88,11 @@ int main(int argc, char** argv) {
     if (free_slots == 0) continue;  // the gap in `sequence` tells the estimator of the frame
     frame.slot = static_cast<uint32_t>(__builtin_ctzll(free_slots));
     uint8_t* slot = slots + frame.slot * kSlotBytes;
-    const std::string name = "/data/" + std::to_string(frame.t_ns) + ".png";
-    frame.images = read_png(folder + "/cam0" + name, slot) * FBVINS_SOCKET_LEFT;
-    frame.images += read_png(folder + "/cam1" + name, slot + kImageBytes) * FBVINS_SOCKET_RIGHT;
+    while (right_images && right_ns < frame.t_ns - kPair_ns) right_images.ignore(1000, '\n') >> right_ns;
+    frame.images = read_png(folder + "/cam0/data/" + std::to_string(frame.t_ns) + ".png", slot) * FBVINS_SOCKET_LEFT;
+    if (right_ns <= frame.t_ns + kPair_ns)
+      frame.images +=
+          read_png(folder + "/cam1/data/" + std::to_string(right_ns) + ".png", slot + kImageBytes) * FBVINS_SOCKET_RIGHT;
     if (frame.images == 0) continue;
     wait_until(frame.t_ns);
     free_slots &= ~(uint64_t{1} << frame.slot);
