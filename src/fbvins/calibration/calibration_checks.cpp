@@ -16,8 +16,9 @@ namespace fbvins {
 namespace {
 
 constexpr int kFewestViews = 6;
-constexpr double kLeastBaseline_m = 1e-3;     ///< as every reader of calibrations demands it
-constexpr double kLargestFocalSigma = 1e-2;   ///< of the focal length near the axis
+constexpr double kLeastBaseline_m = 1e-3;  ///< as every reader of calibrations demands it
+/// Of the focal length near the axis; and where images contradict one another, which is said and in the standard deviations.
+constexpr double kLargestFocalSigma = 5e-3, kLargestOfContradicting = 1e-2;
 constexpr double kLargestCentreSigma = 5e-3;  ///< of the image's width
 constexpr double kNoticedScatter = 1.5;
 
@@ -199,7 +200,7 @@ Result<void> check_determined(const CameraCalibration& found) {
   for (std::size_t k = 0; k < found.cameras.size(); ++k) {
     const Camera& camera = found.cameras[k].camera;
     const double focal = axial_focal_sigma(found, static_cast<int>(k));
-    if (!(focal <= kLargestFocalSigma))
+    if (!(focal <= (found.scatter > kNoticedScatter ? kLargestOfContradicting : kLargestFocalSigma)))
       return undetermined_by(
           fmt::format("the views do not determine the focal length of cam{} (to {:.1f} % only)", k, 100 * focal));
     const double centre_px = std::max(found.sigma(fmt::format("cam{}.cx", k)), found.sigma(fmt::format("cam{}.cy", k)));
