@@ -20,7 +20,7 @@ namespace fbvins::app {
 struct MapArguments {
   bool loop = false, final_ba = false, boosted = false;
   std::string load, save, vocabulary;
-  std::string positions, tags;  ///< files of anchors
+  std::string positions = {}, tags = {};  ///< files of anchors
   bool wanted() const { return loop || final_ba || !load.empty() || !save.empty() || !positions.empty() || !tags.empty(); }
 };
 

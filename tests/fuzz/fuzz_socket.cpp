@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The messages of a sender of sensor data (fbvins/live/socket_protocol.hpp), as a fuzz target.
+#include <cstring>
 #include <span>
 
 #include "fbvins/live/socket_message.hpp"
@@ -62,8 +63,10 @@ void check(const SocketUnknown&) {}
 }  // namespace
 
 std::vector<std::string> socket_seeds() {
-  const FbvinsSocketHello hello{{}, FBVINS_SOCKET_MAGIC, 1, 0, FBVINS_SOCKET_HAS_RIG, "seed", 64, 48, 4, 8192, 4096,
-                                0,  seed_rig().pair};
+  FbvinsSocketHello hello{};
+  std::strcpy(hello.magic, FBVINS_SOCKET_MAGIC), std::strcpy(hello.name, "seed");
+  hello.major = 1, hello.flags = FBVINS_SOCKET_HAS_RIG, hello.rig = seed_rig().pair;
+  hello.width_px = 64, hello.height_px = 48, hello.slots = 4, hello.slot_bytes = 8192, hello.right_offset_bytes = 4096;
   FbvinsSocketHello three = hello;
   three.flags |= FBVINS_SOCKET_HAS_CAMERAS;
   three.minor = 2, three.cameras = 3, three.slot_bytes = 12288, three.more_offset_bytes[0] = 8192;
@@ -75,7 +78,7 @@ std::vector<std::string> socket_seeds() {
       bytes_of(FBVINS_SOCKET_HELLO, hello),
       bytes_of(FBVINS_SOCKET_HELLO, three),
       bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
-      bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT}),
+      bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT, {}}),
       bytes_of(FBVINS_SOCKET_POSITION, FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),
       bytes_of(FBVINS_SOCKET_DEVICE, FbvinsSocketDevice{{}, "firmware=5.13.0.50\nusb=2.1\nexposure_ms=4\nstalls=1\n"}),
       bytes_of(FBVINS_SOCKET_GOODBYE, FbvinsSocketGoodbye{{}, FBVINS_SOCKET_DONE, 0, "done"})};

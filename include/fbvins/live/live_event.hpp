@@ -112,9 +112,9 @@ struct LiveView {
   };
   Time t;                                    ///< of the image
   double shutter_to_pose_ms = 0;             ///< from the image's stamp to the estimator's answer
-  std::vector<Feature> features;             ///< in the newest image
-  std::vector<Landmark> landmarks;           ///< of the window; without a pose none
-  std::vector<Vec3> keyframes_W;             ///< the window's, oldest first; likewise
+  std::vector<Feature> features = {};        ///< in the newest image
+  std::vector<Landmark> landmarks = {};      ///< of the window; without a pose none
+  std::vector<Vec3> keyframes_W = {};        ///< the window's, oldest first; likewise
   std::vector<Feature> right_features = {};  ///< of `features`, those also seen by the right camera of their pair, there
 };
 

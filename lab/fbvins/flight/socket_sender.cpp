@@ -140,7 +140,7 @@ Result<void> SocketSender::send(const StereoFrame& frame) {
     if (!heard) return heard.error();
     if (!*heard) break;
   }
-  FbvinsSocketFrame message{{FBVINS_SOCKET_FRAME, sizeof(FbvinsSocketFrame)}, frame.t.ns, sequence_++, 0, 0};
+  FbvinsSocketFrame message{{FBVINS_SOCKET_FRAME, sizeof(FbvinsSocketFrame)}, frame.t.ns, sequence_++, 0, 0, {}};
   if (free_slots_ == 0) return {};
   message.slot = static_cast<std::uint32_t>(std::countr_zero(free_slots_));
   const std::size_t image_bytes = std::size_t{width_px_} * height_px_;

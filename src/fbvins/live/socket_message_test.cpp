@@ -167,7 +167,7 @@ TEST(SocketMessage, ReadingsThatAreNotFiniteAreLeftOutAndCounted) {
 }
 
 TEST(SocketMessage, FramesNameASlotAStampAndAnImage) {
-  const FbvinsSocketFrame good{{FBVINS_SOCKET_FRAME, sizeof(good)}, 42, 7, 3, FBVINS_SOCKET_RIGHT};
+  const FbvinsSocketFrame good{{FBVINS_SOCKET_FRAME, sizeof(good)}, 42, 7, 3, FBVINS_SOCKET_RIGHT, {}};
   const auto message = parse_socket_message(bytes_of(good));
   ASSERT_TRUE(message);
   const auto& frame = std::get<SocketFrame>(*message);
@@ -192,7 +192,7 @@ TEST(SocketMessage, FramesNameASlotAStampAndAnImage) {
 }
 
 TEST(SocketMessage, FramesOfFourCamerasWithoutACommonTrigger) {
-  FbvinsSocketFrame sent{{FBVINS_SOCKET_FRAME, sizeof(sent)}, 42, 7, 3, 0b1101};
+  FbvinsSocketFrame sent{{FBVINS_SOCKET_FRAME, sizeof(sent)}, 42, 7, 3, 0b1101, {}};
   sent.offset_ns[3] = -5'000'000;
   const auto message = parse_socket_message(bytes_of(sent));
   ASSERT_TRUE(message);

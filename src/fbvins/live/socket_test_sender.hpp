@@ -121,7 +121,7 @@ class TestSender {
   std::uint8_t* slot(std::uint32_t k) { return slots_ + k * kSlotBytes; }
   void send_frame(std::int64_t t_ns, std::uint32_t slot, std::uint64_t sequence,
                   std::uint32_t images = FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT) {
-    send(bytes_of(FbvinsSocketFrame{{FBVINS_SOCKET_FRAME, sizeof(FbvinsSocketFrame)}, t_ns, sequence, slot, images}));
+    send(bytes_of(FbvinsSocketFrame{{FBVINS_SOCKET_FRAME, sizeof(FbvinsSocketFrame)}, t_ns, sequence, slot, images, {}}));
   }
   void send_readings(std::span<const FbvinsSocketReading> readings) {
     FbvinsSocketImu imu{};
