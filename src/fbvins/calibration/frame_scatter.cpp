@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fbvins/calibration/lens_jacobian.hpp"
-
 namespace fbvins {
 namespace {
 
@@ -46,11 +44,15 @@ Eigen::MatrixXd more_than_chance(const Eigen::MatrixXd& sample, std::size_t fram
 }  // namespace
 
 Eigen::MatrixXd covariance_by_scatter(const RigAdjustment& adjustment, const Eigen::MatrixXd& unit, double noise_px) {
+  const double variance = noise_px * noise_px;
+  if (!(variance > 0)) return variance * unit;
   const Eigen::VectorXd scale = unit.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * unit * scale.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd L = noise_px * (scale.asDiagonal() * correlation.llt().matrixL().toDenseMatrix());
-  return L * more_than_chance(scatter_of(adjustment, L / noise_px) / (noise_px * noise_px), adjustment.frames().size()) *
-         L.transpose();
+  // Not by Cholesky: combinations may be known ten million times worse than others.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
+  const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::MatrixXd L = scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal();
+  return variance * (L * more_than_chance(scatter_of(adjustment, L) / variance, adjustment.frames().size()) * L.transpose());
 }
 
 }  // namespace fbvins
