@@ -79,7 +79,7 @@ std::vector<IndexHit> CandidateSearch::most_similar(const PlaceMap& map, const B
   if (among.size() * kEntriesOfAKeyframe > index_.entries(words)) return index_.query(words, kMostSimilar, among);
   std::vector<IndexHit> hits;
   for (const KeyframeId id : among)
-    if (const float similarity = similarity_of(words, *map.words_of(*map.find(id))); similarity > 0)
+    if (const float similarity = bow_similarity(words, *map.words_of(*map.find(id))); similarity > 0)
       hits.push_back({id, similarity});
   keep_best(hits, kMostSimilar);
   return hits;
@@ -90,7 +90,7 @@ std::vector<IndexHit> CandidateSearch::most_similar(const PlaceMap& map, const B
   const auto placed = [&](KeyframeId k) { return map.find(k)->placed; };
   if (index_.entries(words) <= kManyEntries) return index_.query(words, kMostSimilar, placed);
   std::vector<IndexHit> hits = index_.shortlist(words, kShortlist, kManyEntries, kFewestWords, placed);
-  for (IndexHit& hit : hits) hit.similarity = similarity_of(words, *map.words_of(*map.find(hit.keyframe)));
+  for (IndexHit& hit : hits) hit.similarity = bow_similarity(words, *map.words_of(*map.find(hit.keyframe)));
   keep_best(hits, kMostSimilar);
   return hits;
 }

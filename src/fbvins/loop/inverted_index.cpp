@@ -12,16 +12,6 @@ bool better(const IndexHit& a, const IndexHit& b) {
 
 }  // namespace
 
-float similarity_of(const BowVector& query, const BowVector& keyframe) {
-  float sum = 0;
-  for (auto i = query.begin(), j = keyframe.begin(); i != query.end() && j != keyframe.end();) {
-    if (i->word == j->word) sum += std::min((i++)->weight, (j++)->weight);
-    else if (i->word < j->word) ++i;
-    else ++j;
-  }
-  return sum;
-}
-
 void keep_best(std::vector<IndexHit>& hits, int most) {
   const auto kept = std::min<std::size_t>(hits.size(), static_cast<std::size_t>(std::max(most, 0)));
   std::ranges::partial_sort(hits, hits.begin() + static_cast<std::ptrdiff_t>(kept), better);

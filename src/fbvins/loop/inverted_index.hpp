@@ -24,8 +24,6 @@ struct IndexHit {
   KeyframeId keyframe;
   float similarity = 0;  ///< bow_similarity of the two
 };
-/// The similarity of a hit, without an index: the same to the bit.
-float similarity_of(const BowVector& query, const BowVector& keyframe);
 /// The most similar ones first, equal ones in order of id; others are dropped.
 void keep_best(std::vector<IndexHit>& hits, int most);
 

@@ -15,7 +15,7 @@ namespace {
 /// Of the memory, for words: those of seven keyframes take as much as the features of one.
 constexpr std::uint64_t kShareOfWords = 4;
 
-bool is_whole(const std::string& bytes, std::uint64_t expected, std::uint64_t checksum) {
+bool is_whole(std::string_view bytes, std::uint64_t expected, std::uint64_t checksum) {
   return bytes.size() == expected && map_checksum(bytes) == checksum;
 }
 
@@ -43,9 +43,9 @@ Error PlaceStore::as_written(std::size_t slot) const {
 Result<std::string> PlaceStore::bytes_of(std::size_t slot) const {
   const StoredPlace& p = places_[slot];
   std::string bytes = file_->read(p.at, p.place_bytes() + p.words_bytes());
-  if (bytes.size() != p.place_bytes() + p.words_bytes() ||
-      map_checksum(std::string_view(bytes).substr(0, p.place_bytes())) != p.checksum ||
-      map_checksum(std::string_view(bytes).substr(p.place_bytes())) != p.words_checksum)
+  const std::string_view place = std::string_view(bytes).substr(0, p.place_bytes()),
+                         words = std::string_view(bytes).substr(place.size());
+  if (!is_whole(place, p.place_bytes(), p.checksum) || !is_whole(words, p.words_bytes(), p.words_checksum))
     return as_written(slot);
   return bytes;
 }

@@ -52,8 +52,8 @@ const char* fault_of(std::span<const VocabularyNode> nodes, std::uint32_t words)
 
 }  // namespace
 
-double bow_similarity(const BowVector& a, const BowVector& b) {
-  double sum = 0;
+float bow_similarity(const BowVector& a, const BowVector& b) {
+  float sum = 0;
   for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
     if (i->word == j->word) sum += std::min((i++)->weight, (j++)->weight);
     else if (i->word < j->word) ++i;

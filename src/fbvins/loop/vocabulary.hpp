@@ -6,7 +6,7 @@
 //
 //   Result<Vocabulary> vocabulary = Vocabulary::open("orb_vocabulary.fbv");
 //   BowVector words = vocabulary->words_of(features.descriptors);
-//   double similarity = bow_similarity(words, other);      // 0 nothing in common .. 1 the same
+//   float similarity = bow_similarity(words, other);      // 0 nothing in common .. 1 the same
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,9 @@ struct BowEntry {
 /// In order of words.
 using BowVector = std::vector<BowEntry>;
 
-/// 1 - |a - b|_1 / 2, the share of weight in common.
-double bow_similarity(const BowVector& a, const BowVector& b);
+/// 1 - |a - b|_1 / 2, the share of weight in common (L2): added up in order of words, so that an InvertedIndex gives the same
+/// bits.
+float bow_similarity(const BowVector& a, const BowVector& b);
 
 /// A node of the tree. Children lie side by side; the root is node 0, its descriptor means nothing.
 struct VocabularyNode {
