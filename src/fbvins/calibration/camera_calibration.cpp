@@ -91,10 +91,9 @@ std::vector<RigFrame> chosen_frames(std::vector<RigCamera>& cameras, std::vector
 }
 
 /// The covariance of the cameras' parameters for a noise of 1 px; nullopt where a combination is not determined at all.
-std::optional<Eigen::MatrixXd> unit_covariance(const RigAdjustment& adjustment) {
-  const int size = adjustment.parameter_count();
+std::optional<Eigen::MatrixXd> unit_covariance(const std::vector<RigAdjustment::Evidence>& frames, int size) {
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
-  for (const RigFrame& frame : adjustment.frames()) sum += adjustment.evidence(frame).information;
+  for (const RigAdjustment::Evidence& frame : frames) sum += frame.information;
   const Eigen::VectorXd scale = sum.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * sum * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
@@ -146,8 +145,7 @@ void add_residuals(const RigAdjustment& adjustment, CameraCalibration& out) {
   }
 }
 
-CameraCalibration result_of(const RigAdjustment& adjustment, const std::vector<OneCamera>& cameras, double noise_px,
-                            const Eigen::MatrixXd& unit) {
+CameraCalibration result_of(const RigAdjustment& adjustment, const std::vector<OneCamera>& cameras, double noise_px) {
   CameraCalibration out;
   for (std::size_t k = 0; k < cameras.size(); ++k) {
     const RigCamera& found = adjustment.cameras()[k];
@@ -160,8 +158,6 @@ CameraCalibration result_of(const RigAdjustment& adjustment, const std::vector<O
   }
   out.names = parameter_names(adjustment.cameras());
   out.noise_px = noise_px;
-  out.covariance = covariance_by_scatter(adjustment, unit, noise_px);
-  out.scatter = std::sqrt(out.covariance.diagonal().cwiseQuotient(unit.diagonal()).maxCoeff()) / noise_px;
   add_residuals(adjustment, out);
   return out;
 }
@@ -207,9 +203,12 @@ Result<CameraCalibration> calibrate_cameras(const Detections& detections, const 
           check_fit(noise_px, single_px, cameras[0].size, static_cast<int>(cameras.size()), board, cameras[0].views);
       !good)
     return good.error();
-  const auto unit = unit_covariance(adjustment);
+  const std::vector<RigAdjustment::Evidence> evidence = adjustment.evidence();
+  const auto unit = unit_covariance(evidence, adjustment.parameter_count());
   if (!unit) return undetermined("the views do not determine all parameters");
-  CameraCalibration out = result_of(adjustment, cameras, noise_px, *unit);
+  CameraCalibration out = result_of(adjustment, cameras, noise_px);
+  out.covariance = covariance_by_scatter(evidence, *unit, noise_px);
+  out.scatter = std::sqrt(out.covariance.diagonal().cwiseQuotient(unit->diagonal()).maxCoeff()) / noise_px;
   out.stamps = static_cast<int>(stamps.size());
   out.seen_mirrored = *mirrored;
   if (Result<void> good = check_determined(out); !good) return good.error();

@@ -12,14 +12,13 @@ namespace {
 constexpr double kMostOfOne = 0.9;
 
 /// (C16) Covariance by leaving out each stamp, for a unit covariance L L^T, in the whitened parameters L^-1 x.
-Eigen::MatrixXd scatter_of(const RigAdjustment& adjustment, const Eigen::MatrixXd& L) {
+Eigen::MatrixXd scatter_of(std::span<const RigAdjustment::Evidence> frames, const Eigen::MatrixXd& L) {
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(L.cols(), L.cols());
-  for (const RigFrame& frame : adjustment.frames()) {
-    const RigAdjustment::Evidence evidence = adjustment.evidence(frame);
-    const Eigen::MatrixXd share = L.transpose() * evidence.information * L;
+  for (const RigAdjustment::Evidence& frame : frames) {
+    const Eigen::MatrixXd share = L.transpose() * frame.information * L;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(share);
     const Eigen::VectorXd others = 1 - eigen.eigenvalues().array().min(kMostOfOne);
-    const Eigen::VectorXd gradient = eigen.eigenvectors().transpose() * (L.transpose() * evidence.gradient);
+    const Eigen::VectorXd gradient = eigen.eigenvectors().transpose() * (L.transpose() * frame.gradient);
     const Eigen::VectorXd moved = eigen.eigenvectors() * gradient.cwiseQuotient(others);
     sum.noalias() += moved * moved.transpose();
   }
@@ -43,7 +42,8 @@ Eigen::MatrixXd more_than_chance(const Eigen::MatrixXd& sample, std::size_t fram
 
 }  // namespace
 
-Eigen::MatrixXd covariance_by_scatter(const RigAdjustment& adjustment, const Eigen::MatrixXd& unit, double noise_px) {
+Eigen::MatrixXd covariance_by_scatter(std::span<const RigAdjustment::Evidence> frames, const Eigen::MatrixXd& unit,
+                                      double noise_px) {
   const double variance = noise_px * noise_px;
   if (!(variance > 0)) return variance * unit;
   const Eigen::VectorXd scale = unit.diagonal().cwiseMax(1e-300).cwiseSqrt();
@@ -52,7 +52,7 @@ Eigen::MatrixXd covariance_by_scatter(const RigAdjustment& adjustment, const Eig
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
   const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
   const Eigen::MatrixXd L = scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal();
-  return variance * (L * more_than_chance(scatter_of(adjustment, L) / variance, adjustment.frames().size()) * L.transpose());
+  return variance * (L * more_than_chance(scatter_of(frames, L) / variance, frames.size()) * L.transpose());
 }
 
 }  // namespace fbvins

@@ -4,11 +4,15 @@
 // an image together. What the calibration would be without each stamp shows it (C16). Pure function.
 #pragma once
 
+#include <span>
+
 #include "fbvins/calibration/rig_adjustment.hpp"
 
 namespace fbvins {
 
-/// Covariance of the parameters. `unit`: by the normal equations for a noise of 1 px; `noise_px`: of a corner's coordinate.
-Eigen::MatrixXd covariance_by_scatter(const RigAdjustment& adjustment, const Eigen::MatrixXd& unit, double noise_px);
+/// Covariance of the parameters, from what each stamp says of them (RigAdjustment::evidence()). `unit`: by the normal equations
+/// for a noise of 1 px; `noise_px`: of a corner's coordinate.
+Eigen::MatrixXd covariance_by_scatter(std::span<const RigAdjustment::Evidence> frames, const Eigen::MatrixXd& unit,
+                                      double noise_px);
 
 }  // namespace fbvins

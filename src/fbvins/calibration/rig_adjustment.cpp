@@ -119,6 +119,12 @@ RigAdjustment::Evidence RigAdjustment::evidence(const RigFrame& frame) const {
   return out;
 }
 
+std::vector<RigAdjustment::Evidence> RigAdjustment::evidence() const {
+  std::vector<Evidence> out;
+  for (const RigFrame& frame : frames_) out.push_back(evidence(frame));
+  return out;
+}
+
 namespace {
 
 std::vector<RigCamera> moved(const std::vector<RigCamera>& cameras, const std::vector<int>& first, const Eigen::VectorXd& step) {

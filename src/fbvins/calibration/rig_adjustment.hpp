@@ -66,6 +66,8 @@ class RigAdjustment {
     Eigen::VectorXd gradient;  ///< of the sum over all frames it is 0 where the adjustment has converged
   };
   Evidence evidence(const RigFrame& frame) const;
+  /// Of each frame.
+  std::vector<Evidence> evidence() const;
 
   /// Detected minus predicted; not finite where the lens has no such ray.
   Vec2 residual(const RigFrame& frame, const SeenBoard& view, const SeenCorner& corner) const;
