@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras of one rig that do not have the same time offset from the IMU, or the same line delay. Frames carry the stamps of the
-// cameras' drivers, as they are recorded; the system adds what the calibration says of each camera (exposure_offsets), and so
+// cameras' drivers, as they are recorded; the system adds what the calibration says of each camera (own_offsets), and so
 // everything behind it knows when each image was taken.
 //
 //   rig = with_times(rig, {{.time_offset_s = 0.004}, {.time_offset_s = 0.009, .line_delay_s = 40e-6}});

@@ -22,10 +22,10 @@ namespace fbvins {
 
 /// Frames are delivered in order of time; an image that comes when its frame has been delivered is dropped. A frame is delivered
 /// without a camera's image when that image counts as lost: that camera has delivered a newer one, or another camera has
-/// delivered several since. For a silent camera no frame waits; with its next image but one, at the latest, it is there again.
-/// The time is that of the newest stamp. A camera whose images never meet those of
-/// camera 0 has no common trigger with it: then each frame has the image of it that is nearest to a quarter of an interval
-/// before, with its offset. A depth image without any camera's is dropped, and so are images of other cameras that are too far
+/// delivered several since. For a silent camera no frame waits; with its next image but one, at the latest, it is there again
+/// (silence is measured by the newest stamp of any camera). A camera whose images never meet those of camera 0 has no common
+/// trigger with it: then each frame has the image of it that is nearest to a quarter of an interval before, with its offset. A
+/// depth image without any camera's is dropped, and so are images of other cameras that are too far
 /// from one of camera 0 to be its partner, and nearer than half an interval: as recordings are paired (pair_frames()). One thread
 /// at a time.
 class FrameJoiner {
