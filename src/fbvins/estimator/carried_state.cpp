@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/carried_state.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,6 +10,9 @@
 namespace fbvins {
 namespace {
 
+/// After a restart in a contradiction images and readings have to agree for this time.
+constexpr double kProven_s = 1;
+
 double sigma(const Mat3& covariance) { return std::sqrt(covariance.trace()); }
 
 Vec3 up_B(const SlidingWindow& window) { return window.newest().state.T_FB.q.conjugate() * (window.tilt().q() * Vec3::UnitZ()); }
@@ -16,12 +20,17 @@ Vec3 up_B(const SlidingWindow& window) { return window.newest().state.T_FB.q.con
 }  // namespace
 
 void CarriedState::carry(Time t, const ImuSegment& readings) {
+  step_s_ = (t - now_).seconds();
+  now_ = t;
   up_.carry(t, readings);
   velocity_.carry(readings);
 }
 
 void CarriedState::compare(const SlidingWindow& window, const Solved& solved) {
   const NavState<G>& newest = window.newest().state;
+  if (disputed_ || (unproven_s_ > 0 && solved.contradicted)) unproven_s_ = kProven_s;
+  else unproven_s_ = std::max(0.0, unproven_s_ - step_s_);
+  disputed_ = false;
   tilt_away_B_ = up_.contradiction(up_B(window), newest.bias.gyro_radps);
   if (solved.clipped) velocity_.forget();
   const Odometry& odometry = solved.odometry;
@@ -38,13 +47,15 @@ void CarriedState::remember(const SlidingWindow& window, const Odometry& publish
       {up_B(window), published.tilt_sigma_rad, window.newest().state.bias.gyro_radps, sigma(published.gyro_bias_covariance)});
 }
 
-void CarriedState::restart() {
+void CarriedState::restart(bool disputed) {
+  disputed_ = disputed || unproven_s_ > 0;
   up_.restart();
   velocity_.restart();
 }
 
 void CarriedState::begin_window() {
   tilt_away_B_.reset();
+  unproven_s_ = 0;
   covariances_.reset();
 }
 

@@ -32,12 +32,12 @@ class CarriedState {
   void compare(const SlidingWindow& window, const Solved& solved);
   /// After a frame is published: up, of a good pose.
   void remember(const SlidingWindow& window, const Odometry& published, bool clipped);
-  /// The window is gone.
-  void restart();
+  /// The window is gone. `disputed`: images and readings contradicted each other, and which of them is wrong is unknown.
+  void restart(bool disputed);
   /// Another window begins.
   void begin_window();
 
-  bool contradicted() const { return tilt_away_B_ || velocity_.contradicted(); }
+  bool contradicted() const { return tilt_away_B_ || velocity_.contradicted() || unproven_s_ > 0; }
   /// A contradiction is over that has moved the pose by more than a good one may be wrong. True once.
   bool take_reset() { return velocity_.take_reset(); }
 
@@ -56,7 +56,11 @@ class CarriedState {
 
   CarriedUp up_;
   CarriedVelocity velocity_;
-  std::optional<Vec3> tilt_away_B_;         ///< of a new window, from what was known before it, rad
+  std::optional<Vec3> tilt_away_B_;  ///< of a new window, from what was known before it, rad
+  bool disputed_ = false;            ///< the window before was
+  double unproven_s_ = 0;            ///< so long images and readings have to agree in a new one
+  double step_s_ = 0;                ///< of the newest frame
+  Time now_;
   std::optional<Covariances> covariances_;  ///< of the newest state that had any
 };
 

@@ -199,6 +199,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   EstimatorStats& stats = out.odometry.stats;
   CpuTimer timer;
   const bool standstill = rest.seconds() > kRestForStandstill_s;
+  const Duration dt = frame.t - window_.newest().t;
   ImuSegment imu = frame.imu;
   imu.noise = reading_noise_.of(imu);
   Frame predicted = predict(frame, imu);
@@ -215,6 +216,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.make_newest_keyframe(stats.keyframe);
   monitor_.take({frame.t, window_.newest().state.bias, out.odometry.gyro_bias_covariance, out.odometry.accel_bias_covariance});
+  monitor_.take(turns_of(window_.frames()), window_.newest().state.T_FB, dt);
   compare_carried(out.odometry);
   out.odometry.health = judge(frame, out.odometry);
   if (out.odometry.health.has_pose()) shrink_window(solution, out);
@@ -234,12 +236,12 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
   }
   const Monitor::Verdict verdict = monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_,
                                                     predicted.state.T_FB, dt, predicted.state.v_B());
-  if (verdict.imu_contradicts) {
+  if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
     imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);
     predicted = predict(frame, imu);
-    predicted.state.T_FB = *verdict.seen;
   }
+  if (verdict.imu_contradicts) predicted.state.T_FB = *verdict.seen;
   std::vector<TrackedFeature> accepted = frame.features;
   if (!verdict.wrong) return accepted;
   wrong_cameras_ = static_cast<std::uint8_t>(1u << verdict.wrong->left | 1u << verdict.wrong->right);
@@ -364,7 +366,7 @@ void Estimator::begin_new_W() {
 }
 
 void Estimator::restart() {
-  carried_.restart();
+  carried_.restart(monitor_.contradicted());
   const Pose<W, B>& last = published_.T_WB();
   // The next gauge begins where this W ends, so that the pose goes on from where it was published last.
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();

@@ -33,6 +33,11 @@ constexpr double kDrift_sigma = 4, kDrift_s = 0.5, kScale = 0.005;
 constexpr double kLasting_sigma = 1.5, kLastingScale = 0.4, kLasting_s = 0.5;
 /// What is left of a sudden drift does not last: it is forgotten after this time.
 constexpr double kForgotten_s = 1;
+/// The window's turns against the readings', in standard deviations, beyond what axes that are off by this share of the turn
+/// explain: up to 3 where all is well. From the first on they contradict each other, until they are below the second.
+constexpr double kTurn_sigma = 5, kTurnOver_sigma = 3, kTurnScale = 0.002;
+/// By then the pose has moved by about as much, in each direction.
+constexpr double kTurnedAway_m = 0.1;
 /// The other camera, where only one drifts. A camera that was excluded for drift alone is used again after this time: the
 /// landmarks triangulated without it may be what is wrong.
 constexpr double kOther = 0.5, kReadmitted_s = 1;
@@ -132,12 +137,38 @@ Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometr
   return out;
 }
 
+Vec3 middle_of(const std::vector<PointSighting>& sightings) {
+  Vec3 middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along;
+    for (const PointSighting& s : sightings) along.push_back(s.p_G(axis));
+    middle(axis) = median(along);
+  }
+  return middle;
+}
+
 }  // namespace
 
 void Monitor::restart() {
   const std::optional<Biases> refuted = refuted_;
   *this = Monitor(assumed_, calibrating_);
   refuted_ = refuted;
+}
+
+void Monitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt) {
+  if (turns.sigma_rad <= 0) return;
+  const double off = (turns.off_G.norm() - kTurnScale * turns.turned_rad) / (turns.sigma_rad * (calibrating_ ? kCalibrating : 1));
+  const bool before = turning_noise_ > 1;
+  if (off < (before ? kTurnOver_sigma : kTurn_sigma)) {
+    turning_noise_ = 1;
+    return;
+  }
+  turning_noise_ = std::max(turning_noise_, off);
+  if (!before) turned_away_ = true, shifts_G_ += kTurnedAway_m * kTurnedAway_m * Mat3::Identity();
+  const Vec3 turn_G = dt.seconds() / turns.span.seconds() * turns.off_G;
+  take_doubt(now, now.q.conjugate() * turn_G, turn_G.cross(ahead_G_));
+  contradicted_ = true;
+  calm_s_ = 0;
 }
 
 void Monitor::pass(Duration dt) {
@@ -226,6 +257,8 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     pass(dt);
     return out;
   }
+  out.noise.gyro = turning_noise_;
+  ahead_G_ = middle_of(sightings) - predicted.p;
   const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
   const CameraGeometry cameras(calibration);
   const int camera_count = calibration.camera_count();
@@ -281,7 +314,7 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   const Vec3 shift = seen.T_GB.p - predicted.p;
   out.imu_contradicts = true;
   out.seen = seen.T_GB;
-  out.noise.gyro = std::max(1.0, turn.norm() / (assumed_.gyro_noise_density_radps_rthz * std::sqrt(dt.seconds())));
+  out.noise.gyro = std::max(out.noise.gyro, turn.norm() / (assumed_.gyro_noise_density_radps_rthz * std::sqrt(dt.seconds())));
   out.noise.accel =
       std::max(1.0, shift.norm() / (assumed_.accel_noise_density_mps2_rthz * std::sqrt(std::pow(dt.seconds(), 3) / 3)));
   take_doubt(predicted, turn, shift);
@@ -300,7 +333,8 @@ void Monitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const 
 }
 
 bool Monitor::take_reset() {
-  if (contradicted() || (shift_G_.norm() < kReset_m && turn_G_.norm() < kReset_rad)) return false;
+  if (contradicted() || (shift_G_.norm() < kReset_m && turn_G_.norm() < kReset_rad && !turned_away_)) return false;
+  turned_away_ = false;
   turn_G_.setZero(), shift_G_.setZero(), turns_G_.setZero(), shifts_G_.setZero();
   count_reset();
   return true;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "fbvins/estimator/pose_refinement.hpp"
+#include "fbvins/estimator/window_turns.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -26,7 +27,7 @@ class Monitor {
     bool imu_contradicts = false;     ///< images agree with one another, but not with the readings
     std::optional<CameraPair> wrong;  ///< this camera (twice), or this pair, alone contradicts the readings
     std::optional<Pose<G, B>> seen;   ///< by the images alone, where the readings are contradicted
-    ImuNoiseScale noise;              ///< that makes the contradiction one standard deviation
+    ImuNoiseScale noise;              ///< with which the readings count
   };
 
   /// `calibrating`: mounting or time offset are still being found, which contradict the readings, too.
@@ -48,6 +49,8 @@ class Monitor {
   };
   /// After each solve: the biases are where a wrong tilt shows, and faults of the IMU that begin without a contradiction.
   void take(const Biases& biases);
+  /// And the turns of the window. `now`: its newest pose, `dt` after the one before.
+  void take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt);
 
   /// A contradiction was seen within the last half second, or nothing explains the images, or gravity has not confirmed the
   /// attitude since.
@@ -99,6 +102,9 @@ class Monitor {
   Vec3 turn_G_ = Vec3::Zero(), shift_G_ = Vec3::Zero();    ///< seen minus predicted, added up
   Mat3 turns_G_ = Mat3::Zero(), shifts_G_ = Mat3::Zero();  ///< their squares, added up
   Vec3 where_G_ = Vec3::Zero();                            ///< where the turn began
+  Vec3 ahead_G_ = Vec3::Zero();                            ///< from the pose to the middle of what is in view
+  double turning_noise_ = 1;                               ///< of the gyroscope, while the window turns in another way than it
+  bool turned_away_ = false;                               ///< so that the pose has moved
   Vec3 tilt_G_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
   int settling_ = 0;                                       ///< images after darkness that are not judged
   std::optional<Time> begun_;

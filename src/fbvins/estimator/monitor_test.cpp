@@ -339,6 +339,30 @@ TEST(Monitor, ABiasThatIsStillBeingFoundMoves) {
   EXPECT_FALSE(monitor.contradicted());
 }
 
+TEST(Monitor, TurnsOfTheWindowThatTheReadingsExcludeAreAContradiction) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  begin(monitor, scene);
+  const auto turns = [](double off_rad) { return WindowTurns{Vec3(0, 0, off_rad), 4e-4, 1, Duration::from_seconds(1)}; };
+  const auto noise = [&] { return monitor.examine(scene.seen({}), scene.calibration, {}, kStep).noise.gyro; };
+  monitor.take(turns(0.0035), {}, kStep);
+  EXPECT_FALSE(monitor.contradicted()) << "axes may be off by 0.2 percent of the turn";
+  monitor.take(turns(0.0045), {}, kStep);
+  EXPECT_TRUE(monitor.contradicted() && monitor.follows_images());
+  EXPECT_NEAR(noise(), 6.25, 0.01) << "so much less do the readings count";
+  EXPECT_GT(std::sqrt(monitor.doubt({})(0, 0)), 0.1) << "how far the pose has moved meanwhile";
+  monitor.take(turns(0.0035), {}, kStep);
+  EXPECT_NEAR(noise(), 6.25, 0.01) << "it has not ended yet";
+  monitor.take(turns(0.003), {}, kStep);
+  EXPECT_EQ(noise(), 1);
+  EXPECT_FALSE(monitor.take_reset()) << "not before half a second without it";
+  calm(monitor, scene);
+  EXPECT_FALSE(monitor.contradicted());
+  EXPECT_TRUE(monitor.take_reset());
+  EXPECT_FALSE(monitor.take_reset());
+  EXPECT_TRUE(monitor.doubt({}).isZero(0));
+}
+
 TEST(Monitor, DoubtedReadingsMayNotCarryAlone) {
   Scene scene, dark(3);
   Monitor monitor(assumed(), false);
