@@ -45,7 +45,7 @@ class Autopilot final : public FlightController {
 
  private:
   VehicleEstimate in_local(const LivePose& pose) const;
-  void anchor(const LivePose& pose);
+  void place_local_frame(const LivePose& pose);
   void level();
   PerRotor act(double dt_s);
   void watch_ground(double dt_s);

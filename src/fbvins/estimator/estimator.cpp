@@ -291,7 +291,7 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
     const int leaving = keyframe_policy_.leaving(window_, calibration_, keyframe_zone());
     const Frame& host = window_.frames()[leaving];
     const std::optional<Mat17> covariance = solution.covariance(host.id);
-    if (covariance) window_.known().anchor(host.state.T_FB, covariance->topLeftCorner<6, 6>());
+    if (covariance) window_.known().set_host_uncertainty(host.state.T_FB, covariance->topLeftCorner<6, 6>());
     window_.marginalise_keyframe(leaving, calibration_);
   }
   out.odometry.stats.frames_in_window = window_.frames().size();
