@@ -17,8 +17,8 @@ constexpr std::uint32_t kReadingsForSpike = 50;
 constexpr int kRepeats = 4;
 
 Vec3 random_direction(Rng& rng) {
-  const Vec3 v(rng.normal(), rng.normal(), rng.normal());
-  return v.normalized();
+  const double z = rng.normal(), y = rng.normal();
+  return Vec3(rng.normal(), y, z).normalized();
 }
 
 Vec3 normal3(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
