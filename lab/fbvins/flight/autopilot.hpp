@@ -40,8 +40,6 @@ class Autopilot final : public FlightController {
 
   const PerRotor& commands() const override { return out_.control.commands; }
   const AutopilotOutput& output() const override { return out_; }
-  /// T_LW; none before take-off.
-  const std::optional<Pose<Local, W>>& local_from_odometry() const { return T_LW_; }
 
  private:
   VehicleEstimate in_local(const LivePose& pose) const;
