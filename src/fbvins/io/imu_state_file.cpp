@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <charconv>
 #include <filesystem>
 
@@ -41,8 +40,10 @@ Mat3 read_covariance(YamlReader& yaml, const char* field) {
   const std::vector<double> v = yaml.numbers(yaml.root(), field, 6);
   Mat3 m;
   m << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
-  const bool covariance =
-      m.allFinite() && Eigen::SelfAdjointEigenSolver<Mat3>(m, Eigen::EigenvaluesOnly).eigenvalues().minCoeff() >= 0;
+  // No principal minor is negative; a decomposition has no place in a module that is not optimised.
+  const auto minor = [&](int i, int j) { return m(i, i) * m(j, j) - m(i, j) * m(i, j); };
+  const bool covariance = m.allFinite() && m.diagonal().minCoeff() >= 0 && minor(0, 1) >= 0 && minor(0, 2) >= 0 &&
+                          minor(1, 2) >= 0 && m.determinant() >= 0;
   if (!covariance) yaml.complain(yaml.root(), field, "is not a covariance");
   return m;
 }
