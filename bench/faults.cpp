@@ -20,13 +20,14 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "bench/drawn_faults.hpp"
 #include "bench/faulty_tracks.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
@@ -45,7 +46,6 @@ constexpr double kFalse_m = 0.5, kFalseTilt_rad = 5 * kDegree, kFalse_sigma = 5;
 constexpr double kTruth_m = 0.05, kTruth_rad = 1.5 * kDegree;
 /// The heading of W is not observable from poses of a smaller extent.
 constexpr double kHeadingNeeds_m = 0.5;
-constexpr double kLateStart = 0.35, kEarlyEnd = 0.75;  ///< of the flight, in which faults begin
 
 struct Flight {
   std::string name;
@@ -292,92 +292,97 @@ Errors fly(const Flight& flight, const std::string& frontend, std::vector<Sensor
   return judge(flight, way.published, begin, end, poses);
 }
 
-/// Even in the logarithm.
-double between(Rng& rng, double small, double large) { return small * std::pow(large / small, rng.uniform()); }
-
-std::vector<FaultName> kinds_of(bool tracks) {
-  std::vector<FaultName> out;
-  for (const FaultName& name : fault_names())
-    if (!tracks || on_tracks({.kind = name.kind, .image = name.image}) != OnTracks::not_on_tracks) out.push_back(name);
-  return out;
-}
-
-std::string drawn(const Flight& flight, const std::vector<FaultName>& names, std::uint64_t number) {
-  Rng rng(number, 5);
-  const FaultName& name = names[number % names.size()];
-  const double whole_s = (flight.end - flight.begin).seconds();
-  const double start = rng.uniform(kLateStart, kEarlyEnd) * whole_s;
-  const double length = rng.uniform() < 0.1 ? whole_s : between(rng, 0.1, 4);
-  std::string text = fmt::format("{}:{:.2f}:{:.2f}", name.name, start, length);
-  if (name.unit.empty()) return text;
-  const double amount = between(rng, name.small, name.large);
-  return text + fmt::format(":{:.4g}", name.both_signs && rng.below(2) ? -amount : amount);
-}
-
-int run(int argc, char** argv) {
-  CLI::App app("faults drawn at random, and what is called good after them");
-  std::vector<std::string> paths, faults, frontends{"klt", "orb", "boost"};
-  std::string out, poses_out;
+struct Setup {
+  std::vector<std::string> paths = {}, faults = {}, frontends{"klt", "orb", "boost"};
+  std::string out = {}, poses_out = {};
   std::uint64_t flights = 0, first = 0;
   bool clean = false, tracks = false;
   double seconds = 12;
-  app.add_option("recordings", paths, "with ground truth; with --tracks presets, or FOLDER@START")->required();
-  app.add_flag("--tracks", tracks, "synthetic tracks in place of images");
-  app.add_option("--seconds", seconds, "of a flight of tracks");
-  app.add_option("--frontends", frontends)->delimiter(',');
-  app.add_option("--flights", flights, "drawn at random");
-  app.add_option("--first", first, "number of the first one; other numbers are other flights");
-  app.add_option("--fault", faults, "one fault, as of fbvins live")->take_all()->allow_extra_args(false);
-  app.add_flag("--clean", clean, "without faults: each recording once, or --flights of them");
-  app.add_option("--out", out, "CSV; rows that are there are not flown again");
-  app.add_option(
-      "--poses", poses_out,
-      "every pose: seconds, health, reason, reset counter, error and worst standard deviation in m, tilt's in degrees");
-  CLI11_PARSE(app, argc, argv);
-  std::FILE* poses = poses_out.empty() ? nullptr : std::fopen(poses_out.c_str(), "w");
-  std::vector<Flight> recordings;
-  for (const std::string& path : paths) {
-    auto flight = tracks ? prepare(path, seconds) : load(path);
-    if (!flight) return fmt::print(stderr, "{}\n", flight.error().message), 2;
-    recordings.push_back(*std::move(flight));
+
+  void add_to(CLI::App& app) {
+    app.add_option("recordings", paths, "with ground truth; with --tracks presets, or FOLDER@START")->required();
+    app.add_flag("--tracks", tracks, "synthetic tracks in place of images");
+    app.add_option("--seconds", seconds, "of a flight of tracks");
+    app.add_option("--frontends", frontends)->delimiter(',');
+    app.add_option("--flights", flights, "drawn at random");
+    app.add_option("--first", first, "number of the first one; other numbers are other flights");
+    app.add_option("--fault", faults, "one fault, as of fbvins live")->take_all()->allow_extra_args(false);
+    app.add_flag("--clean", clean, "without faults: each recording once, or --flights of them");
+    app.add_option("--out", out, "CSV; rows that are there are not flown again");
+    app.add_option(
+        "--poses", poses_out,
+        "every pose: seconds, health, reason, reset counter, error and worst standard deviation in m, tilt's in degrees");
   }
-  std::set<std::string> done;
-  if (!out.empty()) {
-    std::ifstream file(out);
-    for (std::string line; std::getline(file, line);) done.insert(line.substr(0, line.find(',')));
+};
+
+/// A row for each flight that has none yet.
+class Campaign {
+ public:
+  Campaign(const Setup& setup, std::vector<Flight> recordings) : setup_(setup), recordings_(std::move(recordings)) {
+    if (!setup.poses_out.empty()) poses_.reset(std::fopen(setup.poses_out.c_str(), "w"));
+    if (setup.out.empty()) return;
+    std::ifstream file(setup.out);
+    for (std::string line; std::getline(file, line);) done_.insert(line.substr(0, line.find(',')));
+    rows_.reset(std::fopen(setup.out.c_str(), "a"));
+    if (rows_ == nullptr) throw std::runtime_error(setup.out + ": cannot be written");
   }
-  std::FILE* file = out.empty() ? stdout : std::fopen(out.c_str(), "a");
-  if (file == nullptr) return fmt::print(stderr, "{}: cannot be written\n", out), 2;
-  if (done.empty()) fmt::print(file, "{}\n", kHeader);
-  int failed = 0;
-  const auto one = [&](const std::string& name, const Flight& flight, const std::string& frontend, const std::string& text,
-                       std::uint64_t seed) {
-    if (done.contains(name)) return;
+
+  /// The number of flights with a false `good`.
+  int fly_all() {
+    if (done_.empty()) fmt::print(rows(), "{}\n", kHeader);
+    const std::vector<std::string> frontends = setup_.tracks ? std::vector<std::string>{"tracks"} : setup_.frontends;
+    for (const std::string& frontend : frontends)
+      for (const Flight& flight : recordings_) {
+        if (setup_.clean && setup_.flights == 0) one(fmt::format("clean-{}-{}", flight.name, frontend), flight, frontend, "", 1);
+        for (const std::string& text : setup_.faults)
+          one(fmt::format("{}-{}-{}", text, flight.name, frontend), flight, frontend, text, 1);
+      }
+    const std::vector<FaultName> names = kinds_of(setup_.tracks);
+    const std::size_t kinds = names.size();
+    for (std::uint64_t n = setup_.first; n < setup_.first + setup_.flights; ++n) {
+      const Flight& flight = recordings_[(n / kinds + n) % recordings_.size()];
+      one(std::to_string(n), flight, frontends[(n / kinds + n / 7) % frontends.size()],
+          setup_.clean ? "" : drawn((flight.end - flight.begin).seconds(), names, n), n);
+    }
+    return failed_;
+  }
+
+ private:
+  std::FILE* rows() const { return rows_ ? rows_.get() : stdout; }
+  void one(const std::string& name, const Flight& flight, const std::string& frontend, const std::string& text,
+           std::uint64_t seed) {
+    if (done_.contains(name)) return;
     std::vector<SensorFault> parsed;
     if (!text.empty()) {
       auto fault = parse_fault(text);
       if (!fault) throw CLI::ValidationError(fault.error().message);
       parsed.push_back(*fault);
     }
-    const Errors errors = fly(flight, frontend, parsed, seed, poses);
-    failed += errors.false_good > 0;
-    fmt::print(file, "{}\n", row(name, flight, frontend, text, errors));
-    std::fflush(file);
-  };
-  if (tracks) frontends = {"tracks"};
-  for (const std::string& frontend : frontends)
-    for (const Flight& flight : recordings) {
-      if (clean && flights == 0) one(fmt::format("clean-{}-{}", flight.name, frontend), flight, frontend, "", 1);
-      for (const std::string& text : faults) one(fmt::format("{}-{}-{}", text, flight.name, frontend), flight, frontend, text, 1);
-    }
-  const std::vector<FaultName> names = kinds_of(tracks);
-  const std::size_t kinds = names.size();
-  for (std::uint64_t n = first; n < first + flights; ++n) {
-    const Flight& flight = recordings[(n / kinds + n) % recordings.size()];
-    one(std::to_string(n), flight, frontends[(n / kinds + n / 7) % frontends.size()], clean ? "" : drawn(flight, names, n), n);
+    const Errors errors = fly(flight, frontend, parsed, seed, poses_.get());
+    failed_ += errors.false_good > 0;
+    fmt::print(rows(), "{}\n", row(name, flight, frontend, text, errors));
+    std::fflush(rows());
   }
-  if (poses != nullptr) std::fclose(poses);
-  return failed > 0;
+
+  const Setup& setup_;
+  std::vector<Flight> recordings_;
+  std::set<std::string> done_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> rows_{nullptr, &std::fclose}, poses_{nullptr, &std::fclose};
+  int failed_ = 0;
+};
+
+int run(int argc, char** argv) {
+  CLI::App app("faults drawn at random, and what is called good after them");
+  Setup setup;
+  setup.add_to(app);
+  CLI11_PARSE(app, argc, argv);
+  std::vector<Flight> recordings;
+  for (const std::string& path : setup.paths) {
+    auto flight = setup.tracks ? prepare(path, setup.seconds) : load(path);
+    if (!flight) return fmt::print(stderr, "{}\n", flight.error().message), 2;
+    recordings.push_back(*std::move(flight));
+  }
+  return Campaign(setup, std::move(recordings)).fly_all() > 0;
 }
 
 }  // namespace

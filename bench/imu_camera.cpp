@@ -55,98 +55,135 @@ void add_gravity(Block& block, const CameraImuResult& found, const Vec3& truth) 
   block.add(J * (found.gravity_T - truth), J * found.gravity_covariance * J.transpose());
 }
 
+struct Setup {
+  int recordings = 20, first_seed = 100;
+  test::HandHeldOptions scene = {};
+  ImuCameraOptions options = {};
+  std::vector<double> turning = {};
+  bool free_stereo = false, trouble = false;
+
+  void add_to(CLI::App& app) {
+    scene.duration_s = 72;
+    app.add_option("--recordings", recordings);
+    app.add_option("--first-seed", first_seed);
+    app.add_option("--duration", scene.duration_s);
+    app.add_option("--corner-sigma", scene.corner_sigma_px);
+    app.add_option("--cameras", scene.cameras);
+    app.add_option("--tremor", scene.tremor);
+    app.add_option("--line-delay", scene.line_delay_s);
+    app.add_option("--jitter", scene.stamp_jitter_s, "of the images' stamps, s");
+    app.add_option("--turning", turning, "factor on the turns about x, y and z of the IMU");
+    app.add_option("--moving", scene.moving, "factor on the translation");
+    app.add_option("--spacing", options.knot_spacing_s);
+    app.add_flag("--axes", options.imu_axes);
+    app.add_flag("--free-stereo", free_stereo);
+    app.add_flag("--trouble", trouble, "outliers, blur, dropped readings and spikes, the board out of view");
+  }
+  /// What follows from the arguments.
+  void complete() {
+    if (turning.size() == 3) scene.turning = Vec3(turning[0], turning[1], turning[2]);
+    options.line_delay = scene.line_delay_s != 0;
+    if (options.imu_axes) {
+      scene.axes.gyro << 1.01, 0.004, -0.006, 0.003, 0.995, 0.002, -0.001, 0.005, 1.003;
+      scene.axes.accel << 1.006, 0, 0, 0.004, 0.992, 0, -0.003, 0.002, 1.01;
+    }
+    if (trouble)
+      scene.outlier_share = 0.01, scene.blur_share = 0.1, scene.dropped_share = 0.02, scene.spike_share = 0.001,
+      scene.hidden_from_s = 10, scene.hidden_to_s = 13;
+  }
+};
+
+/// What is found beside the truth, over all recordings.
+class Comparison {
+ public:
+  explicit Comparison(const Setup& setup) : setup_(setup) {}
+
+  void add(int seed, const CameraImuResult& found, const test::HandHeldTruth& truth, double took_s);
+  void print(int refused, double mean_s, double worst_s) const;
+
+ private:
+  void add_axes(const CameraImuResult& found, const test::HandHeldTruth& truth);
+
+  const Setup& setup_;
+  Block turn_{"rotation", "deg", 1 / kDegree, 0.01}, place_{"translation", "mm", 1e3, 0.5},
+      offset_{"time offset", "ms", 1e3, 0.05}, gravity_{"direction of gravity", "deg", 1 / kDegree, 0},
+      delay_{"line delay", "us", 1e6, 0}, gyro_axes_{"gyroscope's axes", "1e-3", 1e3, 0},
+      accel_axes_{"accelerometer's axes", "1e-3", 1e3, 0}, gyro_bias_{"gyroscope bias", "mrad/s", 1e3, 0},
+      accel_bias_{"accelerometer bias", "mm/s2", 1e3, 0};
+  double gyro_rms_ = 0, accel_rms_ = 0, corner_ = 0, scale_nees_ = 0;
+};
+
+Eigen::VectorXd one(double x) { return Eigen::VectorXd::Constant(1, x); }
+Eigen::MatrixXd square(double x) { return Eigen::MatrixXd::Constant(1, 1, x * x); }
+
+void Comparison::add_axes(const CameraImuResult& found, const test::HandHeldTruth& truth) {
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) {
+      gyro_axes_.add(one(found.axes.gyro(row, column) - truth.axes.gyro(row, column)),
+                     square(found.axes_sigma.gyro(row, column)));
+      if (column <= row)
+        accel_axes_.add(one(found.axes.accel(row, column) - truth.axes.accel(row, column)),
+                        square(found.axes_sigma.accel(row, column)));
+    }
+}
+
+void Comparison::add(int seed, const CameraImuResult& found, const test::HandHeldTruth& truth, double took_s) {
+  for (std::size_t c = 0; c < (setup_.free_stereo ? found.cameras.size() : 1); ++c) {
+    const CameraOnImu& camera = found.cameras[c];
+    turn_.add(turn_error(truth.T_BC[c].q, camera.T_BC.q), camera.covariance.bottomRightCorner<3, 3>());
+    place_.add(camera.T_BC.p - truth.T_BC[c].p, camera.covariance.topLeftCorner<3, 3>());
+  }
+  offset_.add(one(found.time_offset_s - truth.time_offset_s), square(found.time_offset_sigma_s));
+  add_gravity(gravity_, found, truth.gravity_T);
+  if (setup_.options.line_delay) delay_.add(one(found.line_delay_s - truth.line_delay_s), square(found.line_delay_sigma_s));
+  if (setup_.options.imu_axes) add_axes(found, truth);
+  const BiasAt* bias = &found.biases[found.biases.size() / 2];
+  const ImuBias& true_bias = truth.bias_at(bias->t);
+  gyro_bias_.add(bias->bias.gyro_radps - true_bias.gyro_radps, Mat3(bias->sigma.gyro_radps.cwiseAbs2().asDiagonal()));
+  accel_bias_.add(bias->bias.accel_mps2 - true_bias.accel_mps2, Mat3(bias->sigma.accel_mps2.cwiseAbs2().asDiagonal()));
+  gyro_rms_ += found.gyro_rms_sigmas, accel_rms_ += found.accel_rms_sigmas, corner_ += found.corner_sigma_px;
+  scale_nees_ += std::pow((found.board_scale - 1) / found.board_scale_sigma, 2);
+  fmt::print(
+      "{}: {:.3f} mm {:.5f} deg {:.4f} ms, scale {:.5f} +- {:.5f}, gravity {:.4f} +- {:.4f}, knots {:g} s, gyro {:.3f} accel {:.3f}, {} iterations, {:.1f} s\n",
+      seed, place_.errors.back(), turn_.errors.back(), offset_.errors.back(), found.board_scale, found.board_scale_sigma,
+      found.measured_gravity_mps2, found.measured_gravity_sigma_mps2, found.knot_spacing_s, found.gyro_rms_sigmas,
+      found.accel_rms_sigmas, found.iterations, took_s);
+}
+
+void Comparison::print(int refused, double mean_s, double worst_s) const {
+  const int done = std::max(1, setup_.recordings - refused);
+  fmt::print("\n| | RMS | worst | sigma | wanted | NEES | worst sigmas |\n|---|---|---|---|---|---|---|\n");
+  for (const Block* b : {&turn_, &place_, &offset_, &gravity_, &delay_, &gyro_axes_, &accel_axes_, &gyro_bias_, &accel_bias_})
+    b->print();
+  fmt::print(
+      "\n{} recordings of {:g} s, {} refused; {:.1f} s each, {:.1f} at most; corners {:.4f} px, gyroscope {:.3f}, accelerometer {:.3f} "
+      "sigmas; NEES of the board's scale {:.2f}\n",
+      setup_.recordings, setup_.scene.duration_s, refused, mean_s, worst_s, corner_ / done, gyro_rms_ / done, accel_rms_ / done,
+      scale_nees_ / done);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"accuracy of the camera-IMU calibration on simulated recordings"};
-  int recordings = 20, first_seed = 100;
-  test::HandHeldOptions scene;
-  scene.duration_s = 72;
-  ImuCameraOptions options;
-  std::vector<double> turning;
-  bool free_stereo = false, trouble = false;
-  app.add_option("--recordings", recordings);
-  app.add_option("--first-seed", first_seed);
-  app.add_option("--duration", scene.duration_s);
-  app.add_option("--corner-sigma", scene.corner_sigma_px);
-  app.add_option("--cameras", scene.cameras);
-  app.add_option("--tremor", scene.tremor);
-  app.add_option("--line-delay", scene.line_delay_s);
-  app.add_option("--jitter", scene.stamp_jitter_s, "of the images' stamps, s");
-  app.add_option("--turning", turning, "factor on the turns about x, y and z of the IMU");
-  app.add_option("--moving", scene.moving, "factor on the translation");
-  app.add_option("--spacing", options.knot_spacing_s);
-  app.add_flag("--axes", options.imu_axes);
-  app.add_flag("--free-stereo", free_stereo);
-  app.add_flag("--trouble", trouble, "outliers, blur, dropped readings and spikes, the board out of view");
+  Setup setup;
+  setup.add_to(app);
   CLI11_PARSE(app, argc, argv);
-  if (turning.size() == 3) scene.turning = Vec3(turning[0], turning[1], turning[2]);
-  options.line_delay = scene.line_delay_s != 0;
-  if (options.imu_axes) {
-    scene.axes.gyro << 1.01, 0.004, -0.006, 0.003, 0.995, 0.002, -0.001, 0.005, 1.003;
-    scene.axes.accel << 1.006, 0, 0, 0.004, 0.992, 0, -0.003, 0.002, 1.01;
-  }
-  if (trouble)
-    scene.outlier_share = 0.01, scene.blur_share = 0.1, scene.dropped_share = 0.02, scene.spike_share = 0.001,
-    scene.hidden_from_s = 10, scene.hidden_to_s = 13;
-
-  Block turn{"rotation", "deg", 1 / kDegree, 0.01}, place{"translation", "mm", 1e3, 0.5}, offset{"time offset", "ms", 1e3, 0.05},
-      gravity{"direction of gravity", "deg", 1 / kDegree, 0}, delay{"line delay", "us", 1e6, 0},
-      gyro_axes{"gyroscope's axes", "1e-3", 1e3, 0}, accel_axes{"accelerometer's axes", "1e-3", 1e3, 0};
-  Block gyro_bias{"gyroscope bias", "mrad/s", 1e3, 0}, accel_bias{"accelerometer bias", "mm/s2", 1e3, 0};
-  double worst_s = 0, mean_s = 0, gyro_rms = 0, accel_rms = 0, corner = 0, scale_nees = 0;
+  setup.complete();
+  Comparison comparison(setup);
+  double worst_s = 0, mean_s = 0;
   int refused = 0;
-  for (int i = 0; i < recordings; ++i) {
-    test::HandHeldRecording r = test::hand_held(scene, static_cast<std::uint64_t>(first_seed + i));
-    if (free_stereo) r.input.T_CnC0.clear();
+  for (int seed = setup.first_seed; seed < setup.first_seed + setup.recordings; ++seed) {
+    test::HandHeldRecording r = test::hand_held(setup.scene, static_cast<std::uint64_t>(seed));
+    if (setup.free_stereo) r.input.T_CnC0.clear();
     const auto began = std::chrono::steady_clock::now();
-    const Result<CameraImuResult> found = calibrate_imu_camera(r.input, options);
+    const Result<CameraImuResult> found = calibrate_imu_camera(r.input, setup.options);
     const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-    worst_s = std::max(worst_s, took_s), mean_s += took_s / recordings;
-    if (!found) {
-      ++refused;
-      fmt::print("{}: {}\n", first_seed + i, found.error().message);
-      continue;
-    }
-    for (std::size_t c = 0; c < (free_stereo ? found->cameras.size() : 1); ++c) {
-      const CameraOnImu& camera = found->cameras[c];
-      turn.add(turn_error(r.truth.T_BC[c].q, camera.T_BC.q), camera.covariance.bottomRightCorner<3, 3>());
-      place.add(camera.T_BC.p - r.truth.T_BC[c].p, camera.covariance.topLeftCorner<3, 3>());
-    }
-    const auto one = [](double x) { return Eigen::VectorXd::Constant(1, x); };
-    const auto square = [](double x) { return Eigen::MatrixXd::Constant(1, 1, x * x); };
-    offset.add(one(found->time_offset_s - r.truth.time_offset_s), square(found->time_offset_sigma_s));
-    add_gravity(gravity, *found, r.truth.gravity_T);
-    if (options.line_delay) delay.add(one(found->line_delay_s - r.truth.line_delay_s), square(found->line_delay_sigma_s));
-    if (options.imu_axes)
-      for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 3; ++column) {
-          gyro_axes.add(one(found->axes.gyro(row, column) - r.truth.axes.gyro(row, column)),
-                        square(found->axes_sigma.gyro(row, column)));
-          if (column <= row)
-            accel_axes.add(one(found->axes.accel(row, column) - r.truth.axes.accel(row, column)),
-                           square(found->axes_sigma.accel(row, column)));
-        }
-    const BiasAt* bias = &found->biases[found->biases.size() / 2];
-    const ImuBias& truth = r.truth.bias_at(bias->t);
-    gyro_bias.add(bias->bias.gyro_radps - truth.gyro_radps, Mat3(bias->sigma.gyro_radps.cwiseAbs2().asDiagonal()));
-    accel_bias.add(bias->bias.accel_mps2 - truth.accel_mps2, Mat3(bias->sigma.accel_mps2.cwiseAbs2().asDiagonal()));
-    gyro_rms += found->gyro_rms_sigmas, accel_rms += found->accel_rms_sigmas, corner += found->corner_sigma_px;
-    scale_nees += std::pow((found->board_scale - 1) / found->board_scale_sigma, 2);
-    fmt::print(
-        "{}: {:.3f} mm {:.5f} deg {:.4f} ms, scale {:.5f} +- {:.5f}, gravity {:.4f} +- {:.4f}, knots {:g} s, gyro {:.3f} accel {:.3f}, {} iterations, {:.1f} s\n",
-        first_seed + i, place.errors.back(), turn.errors.back(), offset.errors.back(), found->board_scale,
-        found->board_scale_sigma, found->measured_gravity_mps2, found->measured_gravity_sigma_mps2, found->knot_spacing_s,
-        found->gyro_rms_sigmas, found->accel_rms_sigmas, found->iterations, took_s);
+    worst_s = std::max(worst_s, took_s), mean_s += took_s / setup.recordings;
+    if (found) comparison.add(seed, *found, r.truth, took_s);
+    else ++refused, fmt::print("{}: {}\n", seed, found.error().message);
     std::fflush(stdout);
   }
-  const int done = std::max(1, recordings - refused);
-  fmt::print("\n| | RMS | worst | sigma | wanted | NEES | worst sigmas |\n|---|---|---|---|---|---|---|\n");
-  for (const Block* b : {&turn, &place, &offset, &gravity, &delay, &gyro_axes, &accel_axes, &gyro_bias, &accel_bias}) b->print();
-  fmt::print(
-      "\n{} recordings of {:g} s, {} refused; {:.1f} s each, {:.1f} at most; corners {:.4f} px, gyroscope {:.3f}, accelerometer {:.3f} "
-      "sigmas; NEES of the board's scale {:.2f}\n",
-      recordings, scene.duration_s, refused, mean_s, worst_s, corner / done, gyro_rms / done, accel_rms / done,
-      scale_nees / done);
+  comparison.print(refused, mean_s, worst_s);
   return 0;
 }

@@ -3,7 +3,7 @@
 # One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. RELEASE_TESTS, with the label `release`, are
 # another: statistics over many flights, which sanitizers would make minutes long. DEPS and TEST_DEPS name modules where they can, other
 # libraries otherwise. COLD: compiled with -O1. A cold module must not instantiate products or
-# decompositions of Eigen: the linker could use its slow copy of a template everywhere. PLAIN: without precompiled headers.
+# decompositions of Eigen: the linker could use its slow copy of a template everywhere (tests/cold_modules.py). PLAIN: without precompiled headers.
 # Users link components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
@@ -109,8 +109,12 @@ function(fbvins_module NAME)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:fbvins_flags> ${ARG_PRIVATE_DEPS})
     if(ARG_COLD)
       fbvins_use_precompiled(${target} cold)
-    elseif(NOT ARG_PLAIN)
-      fbvins_use_precompiled(${target} library)
+      set_property(GLOBAL APPEND PROPERTY FBVINS_COLD_MODULES $<TARGET_FILE:${target}>)
+    else()
+      set_property(GLOBAL APPEND PROPERTY FBVINS_OTHER_MODULES $<TARGET_FILE:${target}>)
+      if(NOT ARG_PLAIN)
+        fbvins_use_precompiled(${target} library)
+      endif()
     endif()
   else()
     add_library(${target} INTERFACE)

@@ -214,7 +214,7 @@ class Watch:
     def describe(self, camera):
         camera.link.describe({**camera.facts(), "resets": self.cameras - 1, "stalls": self.stalls})
 
-    def mend(self, camera):
+    def restart_stalled(self, camera):
         """Starts streams that have stopped again; those that stop again within ten seconds: the camera as a whole."""
         if self.recorded or not camera.is_silent():
             return
@@ -239,7 +239,7 @@ def serve(camera, over, watch):
     next_report_s, next_facts_s = 0, time.monotonic() + 1
     while not over.wait(0.2) and camera.failure is None:
         camera.link.keep_open()
-        watch.mend(camera)
+        watch.restart_stalled(camera)
         if time.monotonic() >= next_facts_s and camera.failure is None:
             next_facts_s = time.monotonic() + 1
             watch.describe(camera)

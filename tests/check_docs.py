@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the documents: links between them, to headings as well, have a target; docs/troubleshooting.md has an entry for every
+"""Checks the documents: links between them, to headings as well, have a target; sources that they name are there; docs/troubleshooting.md has an entry for every
 health state and reason of the code; docs/benchmarks.md is what bench/benchmarks writes, and README.md has its rows; all files
-name the same version.
+name the same version; each public header begins with what it is.
 
 usage: check_docs.py [REPOSITORY]      exit 1, and one line for each fault
 """
@@ -13,6 +13,8 @@ import sys
 
 LINK = re.compile(r"(?<!\!)\[[^\]]*\]\(([^)\s]+)\)|!\[[^\]]*\]\(([^)\s]+)\)")
 CODE = re.compile(r"```.*?```|`[^`\n]*`", re.S)
+SOURCE = re.compile(r"`([\w/.-]+\.(?:cpp|hpp|py|js))`")
+OF_OTHERS = {"kalibr_common/ConfigReader.py", "rs-imu-calibration.py"}
 
 
 def slug(heading):
@@ -60,6 +62,24 @@ def benchmarks(root):
             yield f"README.md: docs/benchmarks.md has no row {row}"
 
 
+def sources(root):
+    """Sources that documents name, by the end of their path, are there; and each public header begins with what it is."""
+    ends = set()
+    for folder in ("include", "src", "lab", "apps", "bench", "examples", "python", "tests", "training", "web"):
+        for path in (root / folder).rglob("*.*"):
+            parts = path.relative_to(root).parts
+            ends |= {"/".join(parts[i:]) for i in range(len(parts))}
+    for page in sorted([*root.glob("*.md"), *root.glob("docs/**/*.md")]):
+        if page.name == "CHANGELOG.md":  # tells of what was
+            continue
+        for name in SOURCE.findall(page.read_text(encoding="utf-8")):
+            if name not in ends | OF_OTHERS:
+                yield f"{page.relative_to(root)}: there is no {name}"
+    for header in sorted([*root.glob("include/**/*.hpp"), *root.glob("lab/include/**/*.hpp")]):
+        if not header.read_text(encoding="utf-8").splitlines()[1].startswith("// "):
+            yield f"{header.relative_to(root)}: the second line does not say what it is"
+
+
 def versions(root):
     """All files name the same version."""
     named = {file: re.search(pattern, (root / file).read_text(encoding="utf-8"), re.M).group(1)
@@ -71,8 +91,8 @@ def versions(root):
 
 def main():
     root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()
-    faults = [*links(root), *health(root), *benchmarks(root), *versions(root)]
-    print("\n".join(faults) or "documents: links, health reasons, benchmarks and versions hold")
+    faults = [*links(root), *health(root), *benchmarks(root), *sources(root), *versions(root)]
+    print("\n".join(faults) or "documents: links, sources, health reasons, benchmarks and versions hold")
     return 1 if faults else 0
 
 

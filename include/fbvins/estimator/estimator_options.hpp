@@ -52,8 +52,8 @@ struct EstimatorOptions {
   double gravity_mps2 = 9.81;
   double gyro_noise_scale = 2.5;
   double accel_noise_scale = 24.0;
-  double gyro_walk_scale = 5.0;
-  double accel_walk_scale = 0.4;
+  double gyro_walk_scale = 5.0;   ///< factors on the calibrated random walks of the biases; set by tests
+  double accel_walk_scale = 0.4;  ///< likewise
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
   bool estimate_line_delay = false;
@@ -84,8 +84,6 @@ struct EstimatorOptions {
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);
     v("gyro_noise_scale", gyro_noise_scale, "", "factor on the calibrated gyroscope noise density", 0.1, 100.0);
     v("accel_noise_scale", accel_noise_scale, "", "factor on the calibrated accelerometer noise density (vibration)", 0.1, 100.0);
-    v("gyro_walk_scale", gyro_walk_scale, "", "factor on the calibrated gyroscope bias random walk", 0.01, 100.0);
-    v("accel_walk_scale", accel_walk_scale, "", "factor on the calibrated accelerometer bias random walk", 0.01, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
     v("estimate_line_delay", estimate_line_delay, "", "refine the line delay of a rolling shutter while flying");

@@ -23,8 +23,8 @@ struct OrbFrontendOptions {
   int max_features = 180;
   int max_keypoints = 400;
   double min_distance_px = 14;
-  double memory_s = 1.0;
-  double search_px = 12;
+  double memory_s = 1.0;  ///< how long a feature that is not observed is searched for at its predicted position; set by tests
+  double search_px = 12;  ///< radius around a prediction from the estimator's state; set by tests
   bool subpixel = true;
   bool fill_in = true;
   bool examine_all = false;
@@ -40,8 +40,6 @@ struct OrbFrontendOptions {
       "features followed at once by a pair of cameras; more than two pairs or single cameras share twice as many", 10, 2000);
     v("max_keypoints", max_keypoints, "", "keypoints extracted from one image, as candidates for tracks", 10, 10000);
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
-    v("memory_s", memory_s, "s", "how long a feature that is not observed is searched for at its predicted position", 0.0, 10.0);
-    v("search_px", search_px, "px", "search radius around a prediction from the estimator's state", 2.0, 200.0);
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");
     v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
     v("examine_all", examine_all, "",

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Options of `fbvins live` and LiveSystem: `live` in a configuration. SI units.
 #pragma once
 
 #include "fbvins/live/mavlink_options.hpp"

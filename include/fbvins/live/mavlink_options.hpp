@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Options of what is sent to a flight controller: `live.mavlink` in a configuration (docs/px4.md). SI units, radians.
 #pragma once
 
 #include <string>

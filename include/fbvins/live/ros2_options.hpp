@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Options of the ROS 2 topics and services: `live.ros2` in a configuration (docs/ros2.md).
 #pragma once
 
 #include <string>

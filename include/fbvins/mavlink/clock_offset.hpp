@@ -23,7 +23,7 @@ class ClockOffset {
   /// Median of the newest answers; only where known().
   Duration round_trip() const;
   /// The newest answers contradict the value: the other clock may have begun anew.
-  bool in_doubt() const { return !strays_.empty(); }
+  bool in_doubt() const { return !outliers_.empty(); }
   /// How often the other clock jumped, as it does when that machine restarts.
   int jumps() const { return jumps_; }
 
@@ -31,11 +31,11 @@ class ClockOffset {
   struct Answer {
     Duration offset, round_trip;
   };
-  static constexpr std::size_t kEnough = 8, kKept = 32, kLeapAnswers = 3;
-  static constexpr Duration kLongestRoundTrip{200'000'000}, kLeap{30'000'000};
+  static constexpr std::size_t kEnough = 8, kKept = 32, kJumpAnswers = 3;
+  static constexpr Duration kLongestRoundTrip{200'000'000}, kJump{30'000'000};
 
   bool jumped(const Answer& answer) const;
-  std::deque<Answer> answers_, strays_;
+  std::deque<Answer> answers_, outliers_;
   Duration value_;
   int jumps_ = 0;
 };

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// How the IMU is mounted on a vehicle, and where the vehicle's local frame lies: of MAVLink and ROS 2. Metres, radians.
 #pragma once
 
 namespace fbvins {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Options of the input of a System: `input` in a configuration.
 #pragma once
 
 namespace fbvins {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A state in the estimator's own frame, the gauge G, with the estimated vertical in it. A map or a bundle adjustment, which has
 // to agree with the observations, is built on this; a controller follows the published pose in W (odometry.hpp):
-// G is the frame of the window, never turned and corrected at once; W is published, gravity-aligned and without leaps;
+// G is the frame of the window, never turned and corrected at once; W is published, gravity-aligned and without jumps;
 // M is W corrected by loop closure.
 //
 //   const Vec3 up_G = keyframe.gauge.up_G();                       // unit vector opposite to gravity

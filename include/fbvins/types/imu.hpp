@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Readings of an IMU in the body frame B, their noise and biases. SI units; times are on the images' clock where a type says so.
 #pragma once
 
 #include <vector>

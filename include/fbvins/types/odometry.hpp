@@ -34,13 +34,13 @@ enum class HealthReason {
   implausible_bias,
   implausible_speed,
   solver_failed,
-  one_camera,        ///< no stereo matches
-  frontend_fault,    ///< the frontend returned features that cannot be: they were left out
-  contradiction,     ///< images and IMU readings contradict each other
-  cameras_disagree,  ///< one camera contradicts the other and the IMU: its images are not used
-  imu_clipped,       ///< an axis of the IMU is at the end of its range
-  imu_vibration,     ///< readings are shaken so much that they say little
-  correction_pending,   ///< a correction larger than a good pose may be wrong is published step by step
+  one_camera,          ///< no stereo matches
+  frontend_fault,      ///< the frontend returned features that cannot be: they were left out
+  contradiction,       ///< images and IMU readings contradict each other
+  cameras_disagree,    ///< one camera contradicts the other and the IMU: its images are not used
+  imu_clipped,         ///< an axis of the IMU is at the end of its range
+  imu_vibration,       ///< readings are shaken so much that they say little
+  correction_pending,  ///< a correction larger than a good pose may be wrong is published step by step
 };
 inline constexpr HealthReason kLastHealthReason = HealthReason::correction_pending;
 
@@ -79,7 +79,7 @@ struct EstimatorStats {
 inline constexpr double kLevelSigma_rad = 0.005;
 
 /// One pose of the flight, at an image's stamp. G is the frame of the window, never turned and corrected at once; W is published,
-/// gravity-aligned and without leaps; M is W corrected by loop closure. No correction moves T_WB by more than
+/// gravity-aligned and without jumps; M is W corrected by loop closure. No correction moves T_WB by more than
 /// EstimatorOptions::max_step_m from one image to the next, in addition to the motion, unless `reset_counter` counts up.
 struct Odometry {
   FrameId id;

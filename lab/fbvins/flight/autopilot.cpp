@@ -65,7 +65,7 @@ VehicleEstimate Autopilot::in_local(const LivePose& pose) const {
 
 /// Places L at the standing vehicle, or, after a restart of the odometry, such that the vehicle keeps its last known position
 /// and heading. Position and heading only: W is gravity-aligned, and level() adds the floor's correction.
-void Autopilot::anchor(const LivePose& pose) {
+void Autopilot::place_local_frame(const LivePose& pose) {
   const Pose<M, BodyFlu> T_MV = T_MW_ * pose.T_WB * mounting_.inverse();
   const bool in_flight = T_LW_.has_value();
   if (in_flight) floor_.forget();
@@ -90,7 +90,7 @@ PerRotor Autopilot::update(const ImuSample& reading) {
     restarted = T_LW_.has_value();
     reset_counter_ = pose.reset_counter;
     T_MW_ = {};
-    if (restarted) anchor(pose);
+    if (restarted) place_local_frame(pose);
   }
   out_.t = reading.t;
   out_.health = pose.health;
@@ -113,7 +113,7 @@ PerRotor Autopilot::update(const ImuSample& reading) {
   out_.mode = failsafe_.update(seen, dt_s);
   out_.reason = failsafe_.reason();
   if (before == FlightMode::waiting && out_.mode == FlightMode::mission) {
-    anchor(pose);
+    place_local_frame(pose);
     out_.estimate = in_local(pose);
     reference_.follow(out_.estimate, newest_.bias);
     guide_.begin(out_.estimate.T_LV);

@@ -40,12 +40,10 @@ class Autopilot final : public FlightController {
 
   const PerRotor& commands() const override { return out_.control.commands; }
   const AutopilotOutput& output() const override { return out_; }
-  /// T_LW; none before take-off.
-  const std::optional<Pose<Local, W>>& local_from_odometry() const { return T_LW_; }
 
  private:
   VehicleEstimate in_local(const LivePose& pose) const;
-  void anchor(const LivePose& pose);
+  void place_local_frame(const LivePose& pose);
   void level();
   PerRotor act(double dt_s);
   void watch_ground(double dt_s);

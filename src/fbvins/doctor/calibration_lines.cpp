@@ -7,6 +7,7 @@
 #include <set>
 
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/calibration_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -72,11 +73,9 @@ std::string rate_line(const ImuNoise& noise, CalibrationStyle style) {
 }
 
 std::string noise_lines(const ImuNoise& noise, CalibrationStyle style) {
-  return fmt::format(
-      "{0}gyroscope_noise_density: {1:.4g}\n{0}gyroscope_random_walk: {2:.4g}\n"
-      "{0}accelerometer_noise_density: {3:.4g}\n{0}accelerometer_random_walk: {4:.4g}",
-      imu_file(style), noise.gyro_noise_density_radps_rthz, noise.gyro_random_walk_radps2_rthz,
-      noise.accel_noise_density_mps2_rthz, noise.accel_random_walk_mps3_rthz);
+  std::string out = imu_noise_text(noise, imu_file(style), "{:.4g}");
+  out.pop_back();  // the last newline
+  return out;
 }
 
 }  // namespace

@@ -231,7 +231,7 @@ void EvidenceGatherer::State::detect() {
     KltTrack track;
     track.px = corner.px;
     track.normalised = *normalised;
-    follower.set_anchor(track, patches, images.left());
+    follower.set_reference(track, patches, images.left());
     tracks.start(track);
   }
 }

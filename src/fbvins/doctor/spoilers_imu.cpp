@@ -74,11 +74,48 @@ Spoiler clipped_gyro(double range) {
           {}};
 }
 
+Spoiler vibration() {
+  return {"vibration of 12 m/s^2 at 83 Hz",
+          FindingKind::vibration,
+          0,
+          0,
+          {},
+          [](ImuSample& s) {
+            s.accel_mps2.z() +=
+                12 * std::numbers::sqrt2 * std::sin(2 * std::numbers::pi * 83 * (s.t.ns % 1'000'000'000'000) * 1e-9);
+          },
+          {}};
+}
+
+Spoiler each_given_twice() {
+  auto held = std::make_shared<std::pair<int, ImuSample>>();
+  return {"each reading given twice",
+          FindingKind::imu_stamps,
+          0,
+          0,
+          {},
+          [held](ImuSample& s) {
+            if (held->first++ % 2 == 0) held->second = s;
+            else s.gyro_radps = held->second.gyro_radps, s.accel_mps2 = held->second.accel_mps2;
+          },
+          {}};
+}
+
+Spoiler stamped_since_power_on() {
+  return {"readings stamped since power-on",
+          FindingKind::clocks_apart,
+          0,
+          0,
+          {},
+          [](ImuSample& s) { s.t = s.t - Duration{1'000'000'000'000'000}; },
+          {}};
+}
+
 }  // namespace
 
 std::vector<Spoiler> of_the_imu() {
   const Mat3 one = Mat3::Identity();
-  std::vector<Spoiler> all{
+  return {
       gyro("gyroscope in degrees", FindingKind::gyro_units, kDegreesPerRad, kTenth * kDegreesPerRad, kDegreesPerRad * one),
       gyro("gyroscope converted twice", FindingKind::gyro_units, 1 / kDegreesPerRad, kTenth / kDegreesPerRad,
            one / kDegreesPerRad),
@@ -109,36 +146,10 @@ std::vector<Spoiler> of_the_imu() {
       offset_by("gyroscope's bias 0.3 rad/s", FindingKind::gyro_bias, 0.3, 0.06, Vec3(0.2, -0.2, 0.1), Vec3::Zero()),
       offset_by("accelerometer's bias 1.5 m/s^2", FindingKind::accel_bias, 1.5, 0.5, Vec3::Zero(), Vec3(1, -1, 0.5)),
       accel_late(8, 40),
+      vibration(),
+      each_given_twice(),
+      stamped_since_power_on(),
   };
-  all.push_back({"vibration of 12 m/s^2 at 83 Hz",
-                 FindingKind::vibration,
-                 0,
-                 0,
-                 {},
-                 [](ImuSample& s) {
-                   s.accel_mps2.z() +=
-                       12 * std::numbers::sqrt2 * std::sin(2 * std::numbers::pi * 83 * (s.t.ns % 1'000'000'000'000) * 1e-9);
-                 },
-                 {}});
-  auto held = std::make_shared<std::pair<int, ImuSample>>();
-  all.push_back({"each reading given twice",
-                 FindingKind::imu_stamps,
-                 0,
-                 0,
-                 {},
-                 [held](ImuSample& s) {
-                   if (held->first++ % 2 == 0) held->second = s;
-                   else s.gyro_radps = held->second.gyro_radps, s.accel_mps2 = held->second.accel_mps2;
-                 },
-                 {}});
-  all.push_back({"readings stamped since power-on",
-                 FindingKind::clocks_apart,
-                 0,
-                 0,
-                 {},
-                 [](ImuSample& s) { s.t = s.t - Duration{1'000'000'000'000'000}; },
-                 {}});
-  return all;
 }
 
 }  // namespace fbvins::spoil

@@ -135,22 +135,8 @@ void Estimator::refuse_start(Odometry& out) {
 
 void Estimator::open_window(const InitialSolution& start) {
   window_.clear();
-  for (std::size_t i = 0; i < start.frames.size(); ++i) {
-    Frame f;
-    f.id = start.frames[i].id;
-    f.t = start.frames[i].t;
-    f.state = start.states[i];
-    f.keyframe = start.from_rest ? i == 0 : i % 2 == 0;
-    f.standstill = start.from_rest;
-    f.images = start.frames[i].images;
-    f.depth = start.frames[i].depth;
-    if (i > 0) {
-      Preintegration imu(imu_noise_, f.state.bias);
-      imu.integrate(start.frames[i].imu);
-      f.imu = std::make_shared<const Preintegration>(std::move(imu));
-    }
-    window_.add_frame(std::move(f), start.frames[i].features, calibration_);
-  }
+  for (std::size_t i = 0; i < start.frames.size(); ++i)
+    window_.add_frame(frame_of_start(start, i, imu_noise_), start.frames[i].features, calibration_);
   const NavState<G>& first = window_.frames().oldest().state;
   WindowPrior prior = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
   if (weights_of(options_).calibrating()) prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
@@ -178,11 +164,7 @@ TrackedFrame Estimator::refer_to_stamp(const TrackedFrame& frame) const {
 
 Frame Estimator::predict(const TrackedFrame& frame, const ImuSegment& readings) const {
   const Frame& last = window_.newest();
-  Frame f;
-  f.id = frame.id;
-  f.t = frame.t;
-  f.images = frame.images;
-  f.depth = frame.depth;
+  Frame f = without_state(frame);
   if (readings.empty()) {  // constant velocity
     f.state = last.state;
     f.state.T_FB.p += (frame.t - last.t).seconds() * last.state.v_FB;
@@ -311,7 +293,7 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
     const int leaving = keyframe_policy_.leaving(window_, calibration_, keyframe_zone());
     const Frame& host = window_.frames()[leaving];
     const std::optional<Mat17> covariance = solution.covariance(host.id);
-    if (covariance) window_.known().anchor(host.state.T_FB, covariance->topLeftCorner<6, 6>());
+    if (covariance) window_.known().set_host_uncertainty(host.state.T_FB, covariance->topLeftCorner<6, 6>());
     window_.marginalise_keyframe(leaving, calibration_);
   }
   out.odometry.stats.frames_in_window = window_.frames().size();

@@ -2,6 +2,8 @@
 #include "fbvins/estimator/estimator_setup.hpp"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
@@ -39,6 +41,27 @@ double scale_sigma_of(const StereoRig& rig) {
     least = least == 0 ? sigma : std::min(least, sigma);
   }
   return least;
+}
+
+Frame without_state(const TrackedFrame& tracked) {
+  Frame f;
+  f.id = tracked.id;
+  f.t = tracked.t;
+  f.images = tracked.images;
+  f.depth = tracked.depth;
+  return f;
+}
+
+Frame frame_of_start(const InitialSolution& start, std::size_t number, const ImuNoise& noise) {
+  Frame f = without_state(start.frames[number]);
+  f.state = start.states[number];
+  f.keyframe = start.from_rest ? number == 0 : number % 2 == 0;
+  f.standstill = start.from_rest;
+  if (number == 0) return f;
+  Preintegration imu(noise, f.state.bias);
+  imu.integrate(start.frames[number].imu);
+  f.imu = std::make_shared<const Preintegration>(std::move(imu));
+  return f;
 }
 
 }  // namespace fbvins

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the parts of an estimator take from the rig and the options. Pure functions.
+// What the parts of an estimator take from the rig, the options, a tracked frame and a start. Pure functions.
 #pragma once
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/frame_list.hpp"
+#include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/window_problem.hpp"
 
 namespace fbvins {
@@ -20,5 +22,10 @@ Calibration calibration_of(const StereoRig& rig);
 /// Relative standard deviation of the calibrated scale (W21): of the pair with the largest baseline, or of the depth sensor; 0
 /// where neither is there.
 double scale_sigma_of(const StereoRig& rig);
+
+/// A frame of the window, whose state and readings are still to come.
+Frame without_state(const TrackedFrame& tracked);
+/// The start's frame of that number, with its state and its readings.
+Frame frame_of_start(const InitialSolution& start, std::size_t number, const ImuNoise& noise);
 
 }  // namespace fbvins

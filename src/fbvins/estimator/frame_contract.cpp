@@ -32,12 +32,12 @@ const TrackedFrame& FrameContract::enforced(const TrackedFrame& frame) {
   const bool counted = frame.stats.stereo > 0 || stereo_matches(features) == 0;
   broken_ = 0;
   if (good && counted) return frame;
-  mended_ = frame;
+  accepted_ = frame;
   std::unordered_set<TrackId> seen;
-  std::erase_if(mended_.features, [&](const TrackedFeature& f) { return !is_possible(f) || !seen.insert(f.id).second; });
-  mended_.stats.stereo = stereo_matches(mended_.features);
-  broken_ = static_cast<int>(features.size() - mended_.features.size());
-  return mended_;
+  std::erase_if(accepted_.features, [&](const TrackedFeature& f) { return !is_possible(f) || !seen.insert(f.id).second; });
+  accepted_.stats.stereo = stereo_matches(accepted_.features);
+  broken_ = static_cast<int>(features.size() - accepted_.features.size());
+  return accepted_;
 }
 
 }  // namespace fbvins

@@ -25,7 +25,7 @@ class FrameContract {
   bool any_twice(const std::vector<TrackedFeature>& features);
 
   std::vector<TrackId> ids_;
-  TrackedFrame mended_;
+  TrackedFrame accepted_;
   int broken_ = 0;
 };
 

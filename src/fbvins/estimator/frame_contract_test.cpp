@@ -55,10 +55,10 @@ TEST(FrameContract, WhatCannotBeIsLeftOut) {
     frame.features = {seen(1), seen(2), seen(3)};
     break_it(frame.features[1]);
     FrameContract contract;
-    const TrackedFrame& mended = contract.enforced(frame);
-    ASSERT_EQ(mended.features.size(), 2u);
-    EXPECT_EQ(mended.features[0].id, TrackId{1});
-    EXPECT_EQ(mended.features[1].id, TrackId{3});
+    const TrackedFrame& accepted = contract.enforced(frame);
+    ASSERT_EQ(accepted.features.size(), 2u);
+    EXPECT_EQ(accepted.features[0].id, TrackId{1});
+    EXPECT_EQ(accepted.features[1].id, TrackId{3});
     EXPECT_EQ(contract.broken(), 1);
     EXPECT_EQ(contract.enforced(TrackedFrame{}).features.size(), 0u);
     EXPECT_EQ(contract.broken(), 0);

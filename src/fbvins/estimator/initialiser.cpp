@@ -151,7 +151,7 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
     readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1),
                     segment.samples.end());  // neighbours share a stamp
   for (ImuSample& reading : readings) reading.accel_mps2 -= biases.bias.accel_mps2;
-  RestEstimate rest = initialise_at_rest(readings, 0, noise_, RestOptions{}, gravity_mps2_);
+  RestEstimate rest = initialise_at_rest(readings, noise_, RestOptions{}, gravity_mps2_);
   if (!rest.at_rest) {
     reason_ = HealthReason::waiting_for_motion_or_rest;
     return std::nullopt;

@@ -19,10 +19,10 @@ constexpr double kMaxRelativeDepthSigma = 0.05;
 void KnownLandmarks::clear() {
   priors_.clear();
   order_.clear();
-  anchors_.clear();
-  first_anchor_ = 0;
+  uncertainties_.clear();
+  first_uncertainty_ = 0;
   next_ = {};
-  active_anchor_ = {};
+  active_ = {};
   in_use_ = false;
   new_.clear();
 }
@@ -44,8 +44,8 @@ void KnownLandmarks::remember(TrackId track, const Pose<G, C0>& T_GC, const Vec3
   prior.sqrt_information = Mat3(covariance_G.inverse()).llt().matrixU();
   if (!prior.p_G.allFinite() || !prior.sqrt_information.allFinite()) return;
 
-  if (anchors_.empty() || anchors_.back().p_G != next_.p_G) anchors_.push_back(next_);
-  prior.anchor = first_anchor_ + static_cast<std::int64_t>(anchors_.size()) - 1;
+  if (uncertainties_.empty() || uncertainties_.back().p_G != next_.p_G) uncertainties_.push_back(next_);
+  prior.map_uncertainty = first_uncertainty_ + static_cast<std::int64_t>(uncertainties_.size()) - 1;
   priors_.emplace(track, prior);
   order_.push_back(track);
   new_.push_back({track, prior.p_G});
@@ -58,8 +58,8 @@ void KnownLandmarks::make_room() {
     order_.pop_front();
   }
   if (order_.empty()) return;
-  for (const std::int64_t needed = priors_.at(order_.front()).anchor; first_anchor_ < needed; ++first_anchor_)
-    anchors_.pop_front();
+  for (const std::int64_t needed = priors_.at(order_.front()).map_uncertainty; first_uncertainty_ < needed; ++first_uncertainty_)
+    uncertainties_.pop_front();
 }
 
 void KnownLandmarks::forget(TrackId track) {
@@ -71,32 +71,32 @@ std::optional<LandmarkPrior> KnownLandmarks::find(TrackId track) const {
   return it == priors_.end() ? std::nullopt : std::optional<LandmarkPrior>(it->second);
 }
 
-/// Covariance of the map at p: an error (dp, dtheta) at the anchor is dp - [p - p_anchor]x dtheta at p (K5).
-Mat6 KnownLandmarks::propagated(const Anchor& anchor, const Vec3& p_G) {
+/// Covariance of the map at p: an error (dp, dtheta) at p_then is dp - [p - p_then]x dtheta at p (K5).
+Mat6 KnownLandmarks::propagated(const MapUncertainty& then, const Vec3& p_G) {
   Mat6 T = Mat6::Identity();
-  T.topRightCorner<3, 3>() = -hat(p_G - anchor.p_G);
-  return T * anchor.covariance * T.transpose();
+  T.topRightCorner<3, 3>() = -hat(p_G - then.p_G);
+  return T * then.covariance * T.transpose();
 }
 
 void KnownLandmarks::set_active_priors(const Vec3& p_G, std::span<const LandmarkPrior> in_use) {
   in_use_ = !in_use.empty();
-  if (!in_use_ || anchors_.empty()) return;  // the last one's share is kept
-  Anchor mean{p_G, Mat6::Zero()};
-  for (const LandmarkPrior& prior : in_use) {                                        // (K6)
-    const std::int64_t i = std::max<std::int64_t>(prior.anchor - first_anchor_, 0);  // dropped since: the oldest kept
-    mean.covariance += propagated(anchors_[static_cast<std::size_t>(i)], p_G) / static_cast<double>(in_use.size());
+  if (!in_use_ || uncertainties_.empty()) return;  // the last one's share is kept
+  MapUncertainty mean{p_G, Mat6::Zero()};
+  for (const LandmarkPrior& prior : in_use) {  // (K6)
+    const std::int64_t i =
+        std::max<std::int64_t>(prior.map_uncertainty - first_uncertainty_, 0);  // dropped since: the oldest kept
+    mean.covariance += propagated(uncertainties_[static_cast<std::size_t>(i)], p_G) / static_cast<double>(in_use.size());
   }
-  active_anchor_ = mean;
+  active_ = mean;
 }
 
 Mat6 KnownLandmarks::with_map_covariance(const Pose<G, B>& T_GB, const Mat6& window_covariance) const {
   Mat6 from_gauge = Mat6::Identity();
   from_gauge.bottomRightCorner<3, 3>() = T_GB.R().transpose();
-  return (in_use_ ? kTimesCounted : 1.0) * window_covariance +
-         from_gauge * propagated(active_anchor_, T_GB.p) * from_gauge.transpose();
+  return (in_use_ ? kTimesCounted : 1.0) * window_covariance + from_gauge * propagated(active_, T_GB.p) * from_gauge.transpose();
 }
 
-void KnownLandmarks::anchor(const Pose<G, B>& T_GB, const Mat6& window_covariance) {
+void KnownLandmarks::set_host_uncertainty(const Pose<G, B>& T_GB, const Mat6& window_covariance) {
   Mat6 to_gauge = Mat6::Identity();
   to_gauge.bottomRightCorner<3, 3>() = T_GB.R();
   next_ = {T_GB.p, to_gauge * with_map_covariance(T_GB, window_covariance) * to_gauge.transpose()};

@@ -59,7 +59,7 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
   options.capacity = 10;
   KnownLandmarks known(options);
   for (int k = 0; k < 40; ++k) {
-    known.anchor(body_at(Vec3(k, 0, 0)), 1e-7 * (k + 1) * Mat6::Identity());
+    known.set_host_uncertainty(body_at(Vec3(k, 0, 0)), 1e-7 * (k + 1) * Mat6::Identity());
     known.remember(TrackId{k}, kCamera, kPoint, kInformation);
     if (k % 4 == 0) known.forget(TrackId{k});
     if (k % 8 == 0) known.remember(TrackId{k}, kCamera, kPoint, kInformation);  // again
@@ -70,7 +70,7 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
   EXPECT_TRUE(known.find(TrackId{29}).has_value());
   EXPECT_TRUE(known.find(TrackId{32}).has_value()) << "forgotten, and remembered again";
   ASSERT_TRUE(known.find(TrackId{39}).has_value());
-  // Anchors go with their landmarks, and those that stay are still found: variance 39 + 1 of the newest.
+  // Uncertainties go with their landmarks, and those that stay are still found: variance 39 + 1 of the newest.
   known.set_active_priors(Vec3(39, 0, 0), std::array{*known.find(TrackId{39})});
   EXPECT_NEAR(known.with_map_covariance(body_at(Vec3(39, 0, 0)), Mat6::Zero())(0, 0), 40e-7, 1e-10);
 }
@@ -81,7 +81,7 @@ TEST(KnownLandmarks, APoseHasTheUncertaintyOfTheMapThatConstrainsIt) {
   const Pose<G, B> there{Quat::Identity(), Vec3(1, 0, 0)}, here{Quat::Identity(), Vec3(1, 5, 0)};
   heading(5, 5) = 4e-6;
   KnownLandmarks known{KnownLandmarkOptions{}};
-  known.anchor(there, heading);
+  known.set_host_uncertainty(there, heading);
   known.remember(TrackId{1}, kCamera, kPoint, kInformation);
   const Mat6 window = 1e-8 * Mat6::Identity();
   known.set_active_priors(here.p, std::array{*known.find(TrackId{1})});

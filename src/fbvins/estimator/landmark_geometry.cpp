@@ -11,7 +11,7 @@ namespace {
 constexpr double kMaxInverseDepthSigma_1pm = 0.15;
 /// No observation of a triangulated landmark may have a larger residual.
 constexpr double kMaxError_sigma = 6.0;
-/// Over a longer gap the difference of two sightings is no good estimate of the velocity at either.
+/// Over a longer gap the difference of two observations is no good estimate of the velocity at either.
 constexpr double kLongestGap_s = 0.25;
 
 /// p_C = a + rho * b: a ray of the host frame, seen from a camera of another frame (W2, W3).
@@ -45,7 +45,7 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   // Linear in rho: (a + rho b) is parallel to (z, 1) for every observation (W4).
   const CameraGeometry cameras(calibration);
   const NavState<G>& host = frames.at(landmark.host).state;
-  const Sighting& first = landmark.sightings.front();
+  const StereoObservation& first = landmark.observations.front();
   const bool from_right = !first.left;
   const Observation& of_host = from_right ? *first.right : *first.left;
   const Vec2 ray = of_host.normalised;
@@ -53,7 +53,7 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   const Vec3 displaced_from_B = of_host.displacement_B(host.v_B());
   double numerator = 0, information = 0;
   const auto each = [&](auto&& visit) {
-    for (const Sighting& s : landmark.sightings) {
+    for (const StereoObservation& s : landmark.observations) {
       PairGeometry pair;
       const NavState<G>& target = frames.at(s.frame).state;
       pair.set(host.T_FB, target.T_FB);
@@ -96,8 +96,8 @@ Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const
 }
 
 void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const Calibration& calibration) {
-  const Sighting* sighting = landmark.sighting_in(new_host);
-  const bool right_ray = sighting != nullptr && !sighting->left;
+  const StereoObservation* observation = landmark.observation_in(new_host);
+  const bool right_ray = observation != nullptr && !observation->left;
   if (landmark.triangulated) {
     const Vec3 p = scaled_point(landmark, frames.at(new_host), landmark.cameras[right_ray], frames, calibration);
     if (p.z() < kMinScaledDepth) landmark.triangulated = false;
@@ -107,14 +107,14 @@ void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const
   landmark.right_ray = right_ray;
 }
 
-void set_velocities(Sighting& before, Sighting& now, double gap_s) {
+void set_velocities(StereoObservation& before, StereoObservation& now, double gap_s) {
   if (gap_s <= 0 || gap_s > kLongestGap_s) return;
   const bool left = now.left && before.left, right = now.right && before.right;
   if (!left && !right) return;
   if (left) now.left_velocity = (now.left->normalised - before.left->normalised) / gap_s;
   now.right_velocity = right ? Vec2((now.right->normalised - before.right->normalised) / gap_s) : now.left_velocity;
   if (!left) now.left_velocity = now.right_velocity;
-  // The sighting before has differences on both sides now: their mean is its velocity to second order.
+  // The observation before has differences on both sides now: their mean is its velocity to second order.
   const double share = before.left_velocity.isZero(0) ? 1.0 : 0.5;
   before.left_velocity += share * (now.left_velocity - before.left_velocity);
   before.right_velocity += share * (now.right_velocity - before.right_velocity);

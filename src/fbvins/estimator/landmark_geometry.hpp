@@ -10,8 +10,8 @@ namespace fbvins {
 /// Range of triangulation: a landmark that would be nearer is refused, one that would be farther is put at the limit.
 inline constexpr double kNearestLandmark_m = 0.1, kFarthestLandmark_m = 200;
 
-/// Finds (alpha, beta, rho) on the ray of its first sighting, its host's, left if there is one; false, and nothing changed, where
-/// its depth is too uncertain, out of range, or inconsistent with an observation.
+/// Finds (alpha, beta, rho) on the ray of its first observation, its host's, left if there is one; false, and nothing changed,
+/// where its depth is too uncertain, out of range, or inconsistent with an observation.
 bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration& calibration);
 
 /// The landmark in the left camera of a frame, times its inverse depth (W2, W3).
@@ -22,7 +22,7 @@ Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const
 /// that frame's camera.
 void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const Calibration& calibration);
 
-/// Sets the velocities of two consecutive sightings, `gap_s` apart.
-void set_velocities(Sighting& before, Sighting& now, double gap_s);
+/// Sets the velocities of two consecutive observations, `gap_s` apart.
+void set_velocities(StereoObservation& before, StereoObservation& now, double gap_s);
 
 }  // namespace fbvins

@@ -10,7 +10,7 @@ namespace fbvins {
 struct LandmarkPrior {
   Vec3 p_G = Vec3::Zero();                   ///< m
   Mat3 sqrt_information = Mat3::Identity();  ///< 1/m; of the position, in G, relative to the map around it
-  std::int64_t anchor = 0;                   ///< number of KnownLandmarks' anchor with the common uncertainty of that map
+  std::int64_t map_uncertainty = 0;          ///< number of that of the map, common to all of its moment, in KnownLandmarks
 };
 
 /// The landmark in the body of its host, m (W1).

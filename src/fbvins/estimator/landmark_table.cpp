@@ -11,9 +11,10 @@ constexpr std::size_t kMaxOutlierCounts = 20000;
 
 }  // namespace
 
-const Sighting* Landmark::sighting_in(FrameId frame) const {
-  const auto it = std::find_if(sightings.begin(), sightings.end(), [&](const Sighting& s) { return s.frame == frame; });
-  return it == sightings.end() ? nullptr : &*it;
+const StereoObservation* Landmark::observation_in(FrameId frame) const {
+  const auto it =
+      std::find_if(observations.begin(), observations.end(), [&](const StereoObservation& s) { return s.frame == frame; });
+  return it == observations.end() ? nullptr : &*it;
 }
 
 void LandmarkTable::clear() {
@@ -49,7 +50,7 @@ std::pair<Landmark&, bool> LandmarkTable::of_track(TrackId track) {
 void LandmarkTable::remove_unseen() {
   std::size_t out = 0;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (landmarks_[i].sightings.empty()) {
+    if (landmarks_[i].observations.empty()) {
       index_of_track_.erase(landmarks_[i].track);
       continue;
     }

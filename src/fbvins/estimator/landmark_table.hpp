@@ -17,7 +17,7 @@
 namespace fbvins {
 
 /// The observations of a landmark by the two cameras of its group in one frame, one at least.
-struct Sighting {
+struct StereoObservation {
   FrameId frame;
   std::optional<Observation> left, right;
   Vec2 left_velocity = Vec2::Zero();  ///< of the normalised position, 1/s
@@ -33,13 +33,13 @@ struct Landmark {
   bool right_ray = false;  ///< on a ray of the host's right camera: the left one did not see it
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
-  std::optional<LandmarkPrior> prior;  ///< of a re-observed one
-  int outlier_count = 0;               ///< solves after which observations of it were removed as outliers
-  std::vector<Sighting> sightings;     ///< oldest first; a landmark without any is removed
+  std::optional<LandmarkPrior> prior;           ///< of a re-observed one
+  int outlier_count = 0;                        ///< solves after which observations of it were removed as outliers
+  std::vector<StereoObservation> observations;  ///< oldest first; a landmark without any is removed
 
   int ray_camera() const { return cameras[right_ray]; }
-  bool seen_in(FrameId frame) const { return sighting_in(frame) != nullptr; }
-  const Sighting* sighting_in(FrameId frame) const;
+  bool seen_in(FrameId frame) const { return observation_in(frame) != nullptr; }
+  const StereoObservation* observation_in(FrameId frame) const;
 };
 
 class LandmarkTable {
@@ -55,7 +55,7 @@ class LandmarkTable {
   const Landmark* find(TrackId track) const;
   /// The landmark of a track, and whether it is a new one.
   std::pair<Landmark&, bool> of_track(TrackId track);
-  /// Removes landmarks without sightings.
+  /// Removes landmarks without observations.
   void remove_unseen();
 
   /// Remembers the outlier count of a track whose landmark is removed; after three the track is ignored.

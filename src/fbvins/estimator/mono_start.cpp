@@ -23,7 +23,7 @@ using Vec9 = Eigen::Matrix<double, 9, 1>;
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
 /// Tracks in at least so many of the frames, and the fewest of them.
-constexpr std::size_t kFewestSightings = 4, kFewestTracks = 20;
+constexpr std::size_t kFewestObservations = 4, kFewestTracks = 20;
 /// Pairs of frames so far apart are compared for the gyroscope's bias.
 constexpr std::size_t kNear = 1, kFar = 3;
 constexpr std::size_t kFewestInPair = 15;
@@ -56,7 +56,7 @@ std::vector<Track> tracks_of(std::span<const TrackedFrame> frames, const Mat3& R
       const double sigma = 1 / (std::sqrt(std::abs(f.left->sqrt_information.determinant())) * ray.norm());
       tracks[at->second].push_back({k, R_BC * ray.normalized(), sigma});
     }
-  std::erase_if(tracks, [](const Track& t) { return t.size() < kFewestSightings; });
+  std::erase_if(tracks, [](const Track& t) { return t.size() < kFewestObservations; });
   return tracks;
 }
 

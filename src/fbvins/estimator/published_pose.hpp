@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The published pose. It follows the window's newest pose, levelled, and never leaps: corrections by the window are not
+// The published pose. It follows the window's newest pose, levelled, and never jumps: corrections by the window are not
 // published at once but stay pending, and are applied by at most a fixed step with every frame
 // (docs/derivations/window.md, W17-W20).
 //

@@ -9,10 +9,10 @@
 namespace fbvins {
 
 void RestDetector::start(const TrackedFrame& frame) {
-  anchor_.clear();
+  reference_.clear();
   since_ = frame.t;
   for (const TrackedFeature& f : frame.features) {
-    Pixels& pixels = anchor_[f.id];
+    Pixels& pixels = reference_[f.id];
     if (f.left) pixels.left = f.left->pixel;
     if (f.right) pixels.right = f.right->pixel;
   }
@@ -37,8 +37,8 @@ bool RestDetector::imu_is_quiet(const ImuSegment& imu) const {
 Duration RestDetector::update(const TrackedFrame& frame) {
   std::vector<double> motion;
   for (const TrackedFeature& f : frame.features) {
-    const auto before = anchor_.find(f.id);
-    if (before == anchor_.end()) continue;
+    const auto before = reference_.find(f.id);
+    if (before == reference_.end()) continue;
     if (f.left && before->second.left) motion.push_back((f.left->pixel - *before->second.left).norm());
     else if (f.right && before->second.right) motion.push_back((f.right->pixel - *before->second.right).norm());
   }

@@ -23,7 +23,7 @@ class RestDetector {
 
   /// Takes the next frame; returns how long the body has been at rest (zero when it moves).
   Duration update(const TrackedFrame& frame);
-  void reset() { anchor_.clear(); }
+  void reset() { reference_.clear(); }
 
  private:
   void start(const TrackedFrame& frame);
@@ -34,7 +34,7 @@ class RestDetector {
   struct Pixels {
     std::optional<Vec2> left, right;
   };
-  std::unordered_map<TrackId, Pixels> anchor_;  ///< at the beginning of the rest
+  std::unordered_map<TrackId, Pixels> reference_;  ///< at the beginning of the rest
 };
 
 }  // namespace fbvins

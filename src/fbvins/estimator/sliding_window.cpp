@@ -46,14 +46,14 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
     if (landmarks_.rejected(feature.id)) continue;
     auto [landmark, is_new] = landmarks_.of_track(feature.id);
     if (is_new) landmark.prior = known_.find(feature.id), landmark.cameras = feature.cameras;
-    Sighting sighting{newest.id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
-    if (landmark.sightings.empty()) {
+    StereoObservation observation{newest.id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
+    if (landmark.observations.empty()) {
       landmark.host = newest.id;
     } else {
-      Sighting& before = landmark.sightings.back();
-      set_velocities(before, sighting, (newest.t - frames_.at(before.frame).t).seconds());
+      StereoObservation& before = landmark.observations.back();
+      set_velocities(before, observation, (newest.t - frames_.at(before.frame).t).seconds());
     }
-    landmark.sightings.push_back(sighting);
+    landmark.observations.push_back(observation);
     if (landmark.triangulated) continue;
     landmark.triangulated = triangulate(landmark, frames_, calibration);
     if (landmark.triangulated && landmark.prior) refuse_distant_prior(landmark, calibration);
@@ -78,10 +78,10 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
   // If there are too many, those seen by most frames; the older ones among equals.
   std::vector<const Landmark*> chosen;
   for (const Landmark& l : landmarks_.all())
-    if (l.triangulated && l.sightings.size() >= 2) chosen.push_back(&l);
+    if (l.triangulated && l.observations.size() >= 2) chosen.push_back(&l);
   if (static_cast<int>(chosen.size()) > options_.max_landmarks) {
     std::stable_sort(chosen.begin(), chosen.end(),
-                     [](const Landmark* a, const Landmark* b) { return a->sightings.size() > b->sightings.size(); });
+                     [](const Landmark* a, const Landmark* b) { return a->observations.size() > b->observations.size(); });
     chosen.resize(static_cast<std::size_t>(options_.max_landmarks));
     std::sort(chosen.begin(), chosen.end(), [](const Landmark* a, const Landmark* b) { return a->id < b->id; });
   }
@@ -92,7 +92,7 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
     l.camera = landmark->ray_camera();
     l.alpha_beta_rho = landmark->alpha_beta_rho;
     l.first_observation = static_cast<int>(out.observations.size());
-    for (const Sighting& s : landmark->sightings) {
+    for (const StereoObservation& s : landmark->observations) {
       const int frame = frames_.index_of(s.frame);
       const auto [left, right] = landmark->cameras;
       const auto add = [&](const Observation& o, int camera, const Vec2& velocity) {
@@ -126,13 +126,13 @@ void SlidingWindow::take_estimates(const WindowProblem& solved) {
     if (Landmark* landmark = landmarks_.find(l.id)) landmark->alpha_beta_rho = l.alpha_beta_rho;
 }
 
-void SlidingWindow::forget_sightings(FrameId frame, const Calibration& calibration) {
+void SlidingWindow::forget_observations(FrameId frame, const Calibration& calibration) {
   for (Landmark& landmark : landmarks_.all()) {
-    const Sighting* sighting = landmark.sighting_in(frame);
-    if (sighting == nullptr) continue;
-    landmark.sightings.erase(landmark.sightings.begin() + (sighting - landmark.sightings.data()));
-    if (!landmark.sightings.empty() && landmark.host == frame)
-      rehost(landmark, landmark.sightings.front().frame, frames_, calibration);
+    const StereoObservation* observation = landmark.observation_in(frame);
+    if (observation == nullptr) continue;
+    landmark.observations.erase(landmark.observations.begin() + (observation - landmark.observations.data()));
+    if (!landmark.observations.empty() && landmark.host == frame)
+      rehost(landmark, landmark.observations.front().frame, frames_, calibration);
   }
   landmarks_.remove_unseen();
 }
@@ -149,7 +149,7 @@ void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
     fill_problem(calibration, leaving_.problem);
     Marginalised marginalised = marginalise_frame(leaving_.problem, index, {}, leaving_.memory);
     next.imu.reset();
-    forget_sightings(leaving.id, calibration);
+    forget_observations(leaving.id, calibration);
     set_prior(std::move(marginalised.prior));
   } else {
     if (next.imu && leaving.imu) {
@@ -159,7 +159,7 @@ void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
     } else {
       next.imu.reset();
     }
-    forget_sightings(leaving.id, calibration);
+    forget_observations(leaving.id, calibration);
   }
   forget_frame(index);
 }
@@ -175,7 +175,7 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
   for (const LeavingLandmark& l : leaving) remember_before_removal(problem, l, newest_begin, calibration);
   if (index + 1 < frames_.size()) frames_[index + 1].imu.reset();
   landmarks_.remove_unseen();
-  forget_sightings(id, calibration);
+  forget_observations(id, calibration);
   set_prior(std::move(marginalised.prior));
   forget_frame(index);
 }
@@ -184,9 +184,9 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
 void SlidingWindow::remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
                                             const Calibration& calibration) {
   Landmark& landmark = *landmarks_.find(problem.landmarks[leaving.index].id);
-  std::erase_if(landmark.sightings,
-                [&](const Sighting& s) { return !leaving.in_view || frames_.index_of(s.frame) < newest_begin; });
-  if (!landmark.sightings.empty()) rehost(landmark, landmark.sightings.front().frame, frames_, calibration);
+  std::erase_if(landmark.observations,
+                [&](const StereoObservation& s) { return !leaving.in_view || frames_.index_of(s.frame) < newest_begin; });
+  if (!landmark.observations.empty()) rehost(landmark, landmark.observations.front().frame, frames_, calibration);
 }
 
 }  // namespace fbvins

@@ -42,7 +42,7 @@ class SlidingWindow {
   /// for the prior of the first frame, not for one that holds linearised measurements.
   void restart_first_estimates();
 
-  /// Appends a frame and the sightings of its features; triangulates the landmarks that can be.
+  /// Appends a frame and the observations of its features; triangulates the landmarks that can be.
   void add_frame(Frame frame, const std::vector<TrackedFeature>& features, const Calibration& calibration);
   void make_newest_keyframe(bool keyframe) { frames_.newest().keyframe = keyframe; }
   /// Moves the images of a frame out.
@@ -74,7 +74,7 @@ class SlidingWindow {
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);
   void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
-  void forget_sightings(FrameId frame, const Calibration& calibration);
+  void forget_observations(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);
   void remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving, std::span<const Mat3> information);
   void remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,

@@ -22,14 +22,14 @@ int remove_far_observations(Landmark& landmark, const WindowProblem& solved, con
     const WindowObservation& o = solved.observations[numbers.first_observation + k];
     if (!(solved.residual(numbers, o).norm() > kOutlier_sigma)) continue;
     ++removed;
-    const Sighting* s = landmark.sighting_in(solved.frames[o.frame].id);
+    const StereoObservation* s = landmark.observation_in(solved.frames[o.frame].id);
     if (s == nullptr) continue;
-    Sighting& sighting = landmark.sightings[static_cast<std::size_t>(s - landmark.sightings.data())];
+    StereoObservation& observation = landmark.observations[static_cast<std::size_t>(s - landmark.observations.data())];
     // The right position was found from the left one: it goes with it.
-    if (o.camera == landmark.cameras.left) sighting.left.reset();
-    sighting.right.reset();
+    if (o.camera == landmark.cameras.left) observation.left.reset();
+    observation.right.reset();
   }
-  std::erase_if(landmark.sightings, [](const Sighting& s) { return !s.left && !s.right; });
+  std::erase_if(landmark.observations, [](const StereoObservation& s) { return !s.left && !s.right; });
   return removed;
 }
 
@@ -51,11 +51,11 @@ int SlidingWindow::remove_outliers(const WindowProblem& solved) {
 void SlidingWindow::count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
   landmark.outlier_count += 1;
   const bool too_near = numbers.alpha_beta_rho.z() > 1.0 / kNearestLandmark_m;
-  if (landmark.sightings.size() < 2 || landmark.outlier_count >= LandmarkTable::kOutliersUntilRejected || too_near) {
+  if (landmark.observations.size() < 2 || landmark.outlier_count >= LandmarkTable::kOutliersUntilRejected || too_near) {
     landmarks_.keep_outlier_count(landmark);
-    landmark.sightings.clear();
-  } else if (landmark.sightings.front().frame != landmark.host && !landmark.seen_in(landmark.host)) {
-    rehost(landmark, landmark.sightings.front().frame, frames_, solved.calibration);
+    landmark.observations.clear();
+  } else if (landmark.observations.front().frame != landmark.host && !landmark.seen_in(landmark.host)) {
+    rehost(landmark, landmark.observations.front().frame, frames_, solved.calibration);
   }
 }
 

@@ -103,20 +103,20 @@ struct Scene {
   }
 };
 
-TEST(SlidingWindow, FilesSightingsUnderTheirTracks) {
+TEST(SlidingWindow, FilesObservationsUnderTheirTracks) {
   Scene s;
   s.add(0, s.all(0));
   s.add(1, {s.feature(3, 1), s.feature(4, 1, false)});
   EXPECT_EQ(s.window.frames().size(), 2);
   ASSERT_EQ(s.window.landmarks().all().size(), s.points_G.size());
-  EXPECT_EQ(s.landmark(3)->sightings.size(), 2u);
-  EXPECT_TRUE(s.landmark(3)->sightings[1].right.has_value());
-  EXPECT_FALSE(s.landmark(4)->sightings[1].right.has_value());
-  EXPECT_EQ(s.landmark(5)->sightings.size(), 1u);
+  EXPECT_EQ(s.landmark(3)->observations.size(), 2u);
+  EXPECT_TRUE(s.landmark(3)->observations[1].right.has_value());
+  EXPECT_FALSE(s.landmark(4)->observations[1].right.has_value());
+  EXPECT_EQ(s.landmark(5)->observations.size(), 1u);
   EXPECT_EQ(s.landmark(5)->host, FrameId{0});
-  // 0.1 m in 50 ms, 2.3 m away: the velocity of both sightings is that of their difference.
-  EXPECT_NEAR(s.landmark(3)->sightings[0].left_velocity.x(), -kStep_m / 0.05 / 2.3, 1e-9);
-  EXPECT_EQ(s.landmark(3)->sightings[0].left_velocity, s.landmark(3)->sightings[1].left_velocity);
+  // 0.1 m in 50 ms, 2.3 m away: the velocity of both observations is that of their difference.
+  EXPECT_NEAR(s.landmark(3)->observations[0].left_velocity.x(), -kStep_m / 0.05 / 2.3, 1e-9);
+  EXPECT_EQ(s.landmark(3)->observations[0].left_velocity, s.landmark(3)->observations[1].left_velocity);
   EXPECT_EQ(landmarks_in_view(s.window), 2);
 }
 
@@ -199,7 +199,7 @@ TEST(SlidingWindow, AFrameThatIsDroppedLeavesItsReadingsToTheNext) {
   EXPECT_EQ(next.imu->size(), 21);
   // Landmarks it hosted are hosted by the next frame that sees them, and stay where they are.
   EXPECT_EQ(s.landmark(2)->host, FrameId{2});
-  EXPECT_EQ(s.landmark(2)->sightings.size(), 2u);
+  EXPECT_EQ(s.landmark(2)->observations.size(), 2u);
   EXPECT_LT((s.position_G(2) - s.points_G[2]).norm(), 1e-9);
 }
 
@@ -240,7 +240,7 @@ TEST(SlidingWindow, OutliersAreRemovedAndThreeSolvesWithOutliersRejectATrack) {
     EXPECT_EQ(s.window.remove_outliers(s.fill_problem()), 1) << round;
     if (round == 3) break;
     EXPECT_EQ(s.landmark(4)->outlier_count, round);
-    EXPECT_EQ(s.landmark(4)->sightings.size(), 3u) << "the good ones stay";
+    EXPECT_EQ(s.landmark(4)->observations.size(), 3u) << "the good ones stay";
   }
   EXPECT_EQ(s.landmark(4), nullptr);
   EXPECT_TRUE(s.window.landmarks().rejected(TrackId{4}));
@@ -258,8 +258,8 @@ TEST(SlidingWindow, ARightOutlierLeavesTheLeftObservation) {
   features[4].right->normalised.y() += 0.05;
   s.add(2, features);
   EXPECT_EQ(s.window.remove_outliers(s.fill_problem()), 1);
-  EXPECT_EQ(s.landmark(4)->sightings.size(), 3u);
-  EXPECT_FALSE(s.landmark(4)->sightings[2].right.has_value());
+  EXPECT_EQ(s.landmark(4)->observations.size(), 3u);
+  EXPECT_FALSE(s.landmark(4)->observations[2].right.has_value());
 }
 
 /// Keyframes 0 and 1, then three newest frames; track 0 is seen by the keyframes alone, track 1 by all.
@@ -279,7 +279,7 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreRemembered) {
   EXPECT_EQ(s.landmark(0), nullptr) << "out of view";
   ASSERT_NE(s.landmark(1), nullptr) << "in view: starts anew from the newest frames";
   EXPECT_EQ(s.landmark(1)->host, FrameId{2});
-  EXPECT_EQ(s.landmark(1)->sightings.size(), 3u);
+  EXPECT_EQ(s.landmark(1)->observations.size(), 3u);
   ASSERT_TRUE(s.landmark(1)->prior.has_value());
   EXPECT_LT((s.landmark(1)->prior->p_G - s.points_G[1]).norm(), 1e-6);
   const auto known = s.window.known().find(TrackId{0});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Published poses never leap, and become level: the whole estimator on simulated tracks and readings.
+// Published poses never jump, and become level: the whole estimator on simulated tracks and readings.
 #include <gtest/gtest.h>
 
 #include "fbvins/estimator/estimator.hpp"
@@ -66,13 +66,13 @@ TEST(StepContract, HoldsWhileWIsLevelled) {
   EXPECT_GT(step.poses, 150);
 }
 
-TEST(StepContract, HoldsWhenTheWindowLeapsAfterAGap) {
+TEST(StepContract, HoldsWhenTheWindowJumpsAfterAGap) {
   SimulatedFlight flight(Motion(0.6, 0.5), 32);
   flight.reobserves = true;
   flight.images = [](int k) { return k < 80 || k >= 110; };
   const LargestStep step = fly(flight, 200, EstimatorOptions{});
   expect_within(step, EstimatorOptions{});
-  EXPECT_GT(step.gauge_m, EstimatorOptions{}.max_step_m) << "the window did leap";
+  EXPECT_GT(step.gauge_m, EstimatorOptions{}.max_step_m) << "the window did jump";
   EXPECT_EQ(step.restarts, 0);
 }
 

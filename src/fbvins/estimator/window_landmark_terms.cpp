@@ -15,23 +15,23 @@ namespace {
 constexpr double kUnprojectableSigma = 100.0;
 
 /// One frame's observations of a landmark: two rows of each of the two cameras that may see it.
-constexpr int kMostSightings = 2;
+constexpr int kMostObservations = 2;
 template <int Columns>
-using SightingRows = double[kMostSightings][2][Columns];
+using ObservationRows = double[kMostObservations][2][Columns];
 
 /// G = J^T J of the rows of one or two observations. Both triangles: plain loops over fixed lanes.
 template <int Columns>
-FBVINS_INLINE void gram(const SightingRows<Columns>& rows, int sightings, double* G) {
+FBVINS_INLINE void gram(const ObservationRows<Columns>& rows, int observations, double* G) {
   const double *a = rows[0][0], *b = rows[0][1], *c = rows[1][0], *d = rows[1][1];
-  if (sightings == 1)
+  if (observations == 1)
     for (int i = 0; i < Columns; ++i)
       for (int j = 0; j < Columns; ++j) G[i * Columns + j] = a[i] * a[j] + b[i] * b[j];
   else
     for (int i = 0; i < Columns; ++i)
       for (int j = 0; j < Columns; ++j) G[i * Columns + j] = (a[i] * a[j] + b[i] * b[j]) + (c[i] * c[j] + d[i] * d[j]);
 }
-FBVINS_KERNEL void gram_of(const SightingRows<16>& rows, int sightings, double* G) { gram<16>(rows, sightings, G); }
-FBVINS_KERNEL void gram_of(const SightingRows<32>& rows, int sightings, double* G) { gram<32>(rows, sightings, G); }
+FBVINS_KERNEL void gram_of(const ObservationRows<16>& rows, int observations, double* G) { gram<16>(rows, observations, G); }
+FBVINS_KERNEL void gram_of(const ObservationRows<32>& rows, int observations, double* G) { gram<32>(rows, observations, G); }
 
 double landmark_prior_cost(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l) {
   const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_FB, l, w.landmark_priors[l.prior]);
@@ -78,14 +78,14 @@ void list_blocks(const WindowLayout& at, const WindowLandmark& l, const WindowOb
   if (!host_listed) offsets.push_back(at.pose_row(l.host));
 }
 
-/// Linearises the sightings of a landmark in one frame, `o` on: one row of Jacobian and residual for each coordinate, weighed
+/// Linearises the observations of a landmark in one frame, `o` on: one row of Jacobian and residual for each coordinate, weighed
 /// robustly. Adds to `cost`; `o` is the first of another frame afterwards. Returns how many there are.
 template <int Columns>
-int linearise_sightings(const WindowProblem& w, const CameraGeometry& cameras, const PairGeometry& pair, const WindowLandmark& l,
-                        const Vec3& x_h, const WindowObservation*& o, const WindowObservation* end, SightingRows<Columns>& rows,
-                        double& cost) {
+int linearise_observations(const WindowProblem& w, const CameraGeometry& cameras, const PairGeometry& pair,
+                           const WindowLandmark& l, const Vec3& x_h, const WindowObservation*& o, const WindowObservation* end,
+                           ObservationRows<Columns>& rows, double& cost) {
   const int target = o->frame;
-  int sightings = 0;
+  int observations = 0;
   for (; o != end && o->frame == target; ++o) {
     Vec3 p_C;
     Vec2 r;
@@ -95,15 +95,15 @@ int linearise_sightings(const WindowProblem& w, const CameraGeometry& cameras, c
     }
     const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
     cost += robust.cost;
-    double(&sighting)[2][Columns] = rows[sightings++];
-    fill_jacobian_rows<Columns>(cameras, pair, target == l.host, l, x_h, *o, p_C, r, sighting);
+    double(&observation)[2][Columns] = rows[observations++];
+    fill_jacobian_rows<Columns>(cameras, pair, target == l.host, l, x_h, *o, p_C, r, observation);
     if (robust.weight < 1) {
       const double s = std::sqrt(robust.weight);
       for (int k = 0; k < 2; ++k)
-        for (double& x : sighting[k]) x *= s;
+        for (double& x : observation[k]) x *= s;
     }
   }
-  return sightings;
+  return observations;
 }
 
 /// Where the frames of a pair and the landmark stand in the system.
@@ -112,7 +112,7 @@ struct PairPlace {
   bool same;  ///< host and target are one frame
 };
 
-/// Adds the Gram matrix of a landmark's sightings in one frame to the dense system and to the landmark's own block.
+/// Adds the Gram matrix of a landmark's observations in one frame to the dense system and to the landmark's own block.
 template <int Columns>
 void add_gram(const Eigen::Map<const Eigen::Matrix<double, Columns, Columns>>& gram, const PairPlace& at, PointBlock& point,
               NormalEquations& out) {
@@ -149,7 +149,7 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
   const WindowLayout at = out.layout;
   double cost = 0;
   std::array<double, Columns * Columns> G;
-  SightingRows<Columns> rows;
+  ObservationRows<Columns> rows;
   std::vector<int> offsets;
   constexpr int kFirstPoseBlock = Columns == 32 ? 3 : 0;
   for (const WindowLandmark& l : w.landmarks) {
@@ -165,9 +165,9 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
     if (l.prior >= 0) cost += add_landmark_prior(w, cameras, l, host_block, point, out);
     for (const WindowObservation* o = begin; o != end;) {
       const int target = o->frame, target_row = at.pose_row(target);
-      const int sightings = linearise_sightings<Columns>(w, cameras, pairs(l.host, target), l, x_h, o, end, rows, cost);
-      if (sightings == 0) continue;
-      gram_of(rows, sightings, G.data());  // exactly symmetric
+      const int observations = linearise_observations<Columns>(w, cameras, pairs(l.host, target), l, x_h, o, end, rows, cost);
+      if (observations == 0) continue;
+      gram_of(rows, observations, G.data());  // exactly symmetric
       const Eigen::Map<const Eigen::Matrix<double, Columns, Columns>> gram(G.data());
       add_gram<Columns>(gram, {host_row, target_row, host_block, block_of(target_row), target == l.host}, point, out);
     }

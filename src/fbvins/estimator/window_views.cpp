@@ -29,14 +29,14 @@ int landmarks_in_view(const SlidingWindow& window) {
   const FrameId newest = window.newest().id;
   const std::vector<Landmark>& landmarks = window.landmarks().all();
   return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) {
-    return l.triangulated && l.sightings.back().frame == newest && l.sightings.size() >= 2;
+    return l.triangulated && l.observations.back().frame == newest && l.observations.size() >= 2;
   }));
 }
 
 std::vector<TrackId> tracks_in_view(const SlidingWindow& window) {
   std::vector<TrackId> out;
   for (const Landmark& l : window.landmarks().all())
-    if (l.triangulated && l.sightings.back().frame == window.newest().id && l.sightings.size() >= 3) out.push_back(l.track);
+    if (l.triangulated && l.observations.back().frame == window.newest().id && l.observations.size() >= 3) out.push_back(l.track);
   return out;
 }
 
@@ -72,11 +72,11 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
   int seen = 0;
   std::vector<double> motion;
   for (const Landmark& l : window.landmarks().all()) {
-    if (l.sightings.back().frame != newest.id) continue;
+    if (l.observations.back().frame != newest.id) continue;
     ++seen;
-    const Sighting* before = l.sighting_in(keyframe.id);
+    const StereoObservation* before = l.observation_in(keyframe.id);
     if (before == nullptr) continue;
-    const Sighting& now = l.sightings.back();
+    const StereoObservation& now = l.observations.back();
     if (before->left && now.left) motion.push_back(moved_px(l.cameras.left, *before->left, *now.left));
     else if (before->right && now.right) motion.push_back(moved_px(l.cameras.right, *before->right, *now.right));
   }
@@ -127,7 +127,7 @@ WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calib
   for (const Landmark& l : window.landmarks().all()) {
     if (!l.triangulated) continue;
     const Vec3 p_W = tilt.levelled(position_of(l, window.frames(), calibration));
-    out.landmarks.push_back({l.id, l.track, p_W, static_cast<int>(l.sightings.size())});
+    out.landmarks.push_back({l.id, l.track, p_W, static_cast<int>(l.observations.size())});
   }
   return out;
 }
@@ -142,7 +142,7 @@ Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& 
   out.v_WB = level.v_FB;
   out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
-    const Sighting* seen = l.triangulated ? l.sighting_in(f.id) : nullptr;
+    const StereoObservation* seen = l.triangulated ? l.observation_in(f.id) : nullptr;
     if (seen == nullptr || !seen->left || l.cameras.left != 0) continue;
     const Vec3 p_C = scaled_point_in_camera(l, f, window.frames(), calibration) / l.alpha_beta_rho.z();
     out.landmarks.push_back({l.track, seen->left->pixel, calibration.T_BC0 * p_C});

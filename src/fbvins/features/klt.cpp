@@ -171,7 +171,7 @@ bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int co
   return levels[static_cast<std::size_t>(finest)].valid;
 }
 
-bool KltAnchor::take(const Pyramid& pyramid, const Vec2& px) {
+bool KltReference::take(const Pyramid& pyramid, const Vec2& px) {
   const PyramidLevel& level = pyramid.level(0);
   const double fx = std::floor(px.x()), fy = std::floor(px.y());
   constexpr int half = kSide / 2;
@@ -189,18 +189,18 @@ bool KltAnchor::take(const Pyramid& pyramid, const Vec2& px) {
   return true;
 }
 
-bool KltTemplate::cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now) {
+bool KltTemplate::cut_warped(const KltReference& reference, const Mat2& J_reference_now) {
   KltLevelTemplate& out = levels[0];
   out.valid = false;
   constexpr double reach = 0.5 * (klt::kGrid - 1);
-  const Vec2 corner = anchor.centre - reach * (J_anchor_now.col(0) + J_anchor_now.col(1));
-  const Vec2 extent = reach * (J_anchor_now.col(0).cwiseAbs() + J_anchor_now.col(1).cwiseAbs());
-  const Vec2 lowest = anchor.centre - extent, highest = anchor.centre + extent;
-  constexpr double last = KltAnchor::kSide - 1.01;
+  const Vec2 corner = reference.centre - reach * (J_reference_now.col(0) + J_reference_now.col(1));
+  const Vec2 extent = reach * (J_reference_now.col(0).cwiseAbs() + J_reference_now.col(1).cwiseAbs());
+  const Vec2 lowest = reference.centre - extent, highest = reference.centre + extent;
+  constexpr double last = KltReference::kSide - 1.01;
   if (!(lowest.minCoeff() >= 0.01 && highest.maxCoeff() < last)) return false;
   alignas(64) float grid[klt::kGrid * klt::kGridStride];
-  const Eigen::Matrix2f J = J_anchor_now.cast<float>();
-  klt::sample_warped(anchor.pixels.data(), KltAnchor::kSide, static_cast<float>(corner.x()), static_cast<float>(corner.y()),
+  const Eigen::Matrix2f J = J_reference_now.cast<float>();
+  klt::sample_warped(reference.pixels.data(), KltReference::kSide, static_cast<float>(corner.x()), static_cast<float>(corner.y()),
                      J(0, 0), J(0, 1), J(1, 0), J(1, 1), grid);
   out.valid = finish_template(grid, KltWindow::wide, out);
   return out.valid;

@@ -45,7 +45,7 @@ struct alignas(64) KltLevelTemplate {
 
 /// The pixels around a feature in the frame where it was first seen well. Aligning to them in every later
 /// frame, through the warp that the motion since then predicts, keeps a long track from drifting.
-struct KltAnchor {
+struct KltReference {
   static constexpr int kSide = 48;
   std::array<std::uint8_t, kSide * kSide> pixels;
   Vec2 centre = Vec2::Zero();  ///< of the feature, in the block
@@ -60,9 +60,9 @@ struct KltTemplate {
   /// Cuts the patch around `px` (level-0 pixels) from levels finest..coarsest.
   /// False when the feature is too close to the border or the finest patch has no texture in some direction.
   bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest, KltWindow window = KltWindow::wide);
-  /// Level 0 from an anchor: an offset d from the feature in the new image shows what the anchor has at
-  /// J_anchor_now * d. False when the warp leaves the block or the patch has no texture.
-  bool cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now);
+  /// Level 0 from a reference: an offset d from the feature in the new image shows what the reference has at
+  /// J_reference_now * d. False when the warp leaves the block or the patch has no texture.
+  bool cut_warped(const KltReference& reference, const Mat2& J_reference_now);
 };
 
 enum class KltStatus { ok, outside, diverged, poor_match };
@@ -80,7 +80,7 @@ struct KltResult {
 
 /// Last step of a converged alignment; and of the backward check, which only asks whether the feature comes back near its start.
 inline constexpr double kConverged_px = 0.03, kConvergedCheck_px = 0.1;
-/// Largest error of an alignment there and back again, and largest disagreement between the newest patch and the reference, or anchor:
+/// Largest error of an alignment there and back again, and largest disagreement between the newest patch and the reference:
 /// a feature beyond it has drifted and is dropped.
 inline constexpr double kForwardBackward_px = 0.7, kMaxCreep_px = 0.7;
 /// Coarsest level of an alignment from a position that is known to a pixel or two.

@@ -19,7 +19,7 @@ bool PatchReference::take(const Pyramid& pyramid, const Vec2& px, const Camera& 
   J_normalised_pixel_then = J_pixel_normalised.inverse();
   R_now_then.setIdentity();
   depth_ratio = 1;
-  return anchor.take(pyramid, px);
+  return patch.take(pyramid, px);
 }
 
 void PatchReference::carry(const Mat3& R_now_before, double depth_factor) {
@@ -41,7 +41,7 @@ KltResult PatchRefiner::refine(const PatchReference& reference, const Pyramid& i
   const Mat2 J_now_then = reference.warp(camera, normalised_guess);
   const double area = J_now_then.determinant(), limit = kSmallestScale * kSmallestScale;
   if (!(area > limit && area * limit < 1)) return {};
-  if (!warped_.cut_warped(reference.anchor, J_now_then.inverse())) return {};
+  if (!warped_.cut_warped(reference.patch, J_now_then.inverse())) return {};
   return klt_align(warped_, image, start_px, 0, 0);
 }
 

@@ -19,7 +19,7 @@ namespace fbvins {
 
 /// A patch of an image and its warp to the present view: a small plane that faced the camera then.
 struct PatchReference {
-  KltAnchor anchor;
+  KltReference patch;
   Mat2 J_normalised_pixel_then = Mat2::Identity();
   Mat3 R_now_then = Mat3::Identity();  ///< rays of the camera then -> now
   double depth_ratio = 1;              ///< depth now / depth then

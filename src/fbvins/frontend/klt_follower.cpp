@@ -6,10 +6,10 @@
 namespace fbvins {
 namespace {
 
-/// An anchor whose scale changes by more than this, or its inverse, is replaced.
+/// A reference whose scale changes by more than this, or its inverse, is replaced.
 constexpr double kSmallestScale = 0.65;
-/// Correlation with the anchor below which it is replaced.
-constexpr double kMinAnchorCorrelation = 0.8;
+/// Correlation with the reference below which it is replaced.
+constexpr double kMinReferenceCorrelation = 0.8;
 constexpr int kTop = kKltLevels - 1;
 /// Coarsest level where motion and depth are known, and that of the backward check.
 constexpr int kWellPredictedLevel = 2, kBackLevel = 1;
@@ -31,27 +31,27 @@ KltResult KltFollower::align(const KltTrack& track, const KltTemplate& patch, co
   return found.ok() || !well_predicted ? found : klt_align(patch, left, start, kTop, 0);
 }
 
-KltResult KltFollower::align_to_anchor(const KltTrack& track, const KltAnchor& anchor, const Vec2& start_px,
-                                       const Pyramid& left) {
+KltResult KltFollower::align_to_reference(const KltTrack& track, const KltReference& reference, const Vec2& start_px,
+                                          const Pyramid& left) {
   Mat2 J_pixel_normalised;
   camera_.distort(track.normalised, &J_pixel_normalised);
-  // A small plane, fronto-parallel in the anchor's image, as seen in the newest one.
+  // A small plane, fronto-parallel in the reference's image, as seen in the newest one.
   Eigen::Matrix<double, 2, 3> project;
   project << 1, 0, -track.normalised.x(), 0, 1, -track.normalised.y();
-  const Mat2 J_now_anchor =
-      J_pixel_normalised * project * track.R_now_anchor.leftCols<2>() / track.depth_ratio * track.J_normalised_pixel_anchor;
-  const double scale2 = J_now_anchor.determinant();
+  const Mat2 J_now_reference =
+      J_pixel_normalised * project * track.R_now_reference.leftCols<2>() / track.depth_ratio * track.J_normalised_pixel_reference;
+  const double scale2 = J_now_reference.determinant();
   if (!(scale2 > kSmallestScale * kSmallestScale && scale2 * kSmallestScale * kSmallestScale < 1)) return {};
-  if (!warped_.cut_warped(anchor, J_now_anchor.inverse())) return {};
+  if (!warped_.cut_warped(reference, J_now_reference.inverse())) return {};
   return klt_align(warped_, left, start_px, 0, 0);
 }
 
-void KltFollower::set_anchor(KltTrack& track, KltPatches& patches, const Pyramid& left) const {
-  patches.anchor.take(left, track.px);
+void KltFollower::set_reference(KltTrack& track, KltPatches& patches, const Pyramid& left) const {
+  patches.reference.take(left, track.px);
   Mat2 J_pixel_normalised;
   camera_.distort(track.normalised, &J_pixel_normalised);
-  track.J_normalised_pixel_anchor = J_pixel_normalised.inverse();
-  track.R_now_anchor.setIdentity();
+  track.J_normalised_pixel_reference = J_pixel_normalised.inverse();
+  track.R_now_reference.setIdentity();
   track.depth_ratio = 1;
 }
 
@@ -64,7 +64,7 @@ bool KltFollower::carry(KltTrack& track, const Vec2& found_px, const CameraMotio
   track.previous_normalised = track.normalised;
   track.previous_inverse_depth = track.inverse_depth;
   track.normalised = *normalised;
-  track.R_now_anchor = motion.R_ba * track.R_now_anchor;
+  track.R_now_reference = motion.R_ba * track.R_now_reference;
   track.depth_ratio *= p_now.z();
   if (track.inverse_depth) *track.inverse_depth /= p_now.z();
   return true;
@@ -78,13 +78,13 @@ bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotio
     return false;
   }
   if (!carry(track, found.px, motion)) return false;
-  const KltResult anchored = align_to_anchor(track, patches.anchor, found.px, images.left());
-  const bool anchor_holds = anchored.ok() && anchored.correlation > kMinAnchorCorrelation;
-  if (anchor_holds && (anchored.px - found.px).norm() > kMaxCreep_px) {
+  const KltResult to_reference = align_to_reference(track, patches.reference, found.px, images.left());
+  const bool reference_holds = to_reference.ok() && to_reference.correlation > kMinReferenceCorrelation;
+  if (reference_holds && (to_reference.px - found.px).norm() > kMaxCreep_px) {
     ++stats.lost_check;
     return false;
   }
-  if (anchor_holds) found.px = anchored.px;
+  if (reference_holds) found.px = to_reference.px;
   if (!camera_.inside(found.px, kPatchBorder_px) || !patches.newest.cut(images.left(), found.px, 0, kTop)) {
     ++stats.lost_flow;
     return false;
@@ -98,7 +98,7 @@ bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotio
   if (!normalised) return false;
   track.px = found.px;
   track.normalised = *normalised;
-  if (!anchor_holds) set_anchor(track, patches, images.left());
+  if (!reference_holds) set_reference(track, patches, images.left());
   ++track.age_frames;
   return true;
 }

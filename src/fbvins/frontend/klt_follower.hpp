@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Follows one feature of the klt frontend into the newest image: Lucas-Kanade from its predicted position, aligned with
-// the patch with which it began (its anchor), and a forward-backward check.
+// the patch with which it began (its reference), and a forward-backward check.
 // Holds scratch memory; one instance, one thread.
 //
 //   KltFollower follower(camera);
@@ -21,10 +21,10 @@ inline constexpr int kKltLevels = 4;
 
 struct KltTrack : TrackState {
   static constexpr int kHistory = 6;  ///< frames of the long epipolar check
-  // since its anchor was taken:
-  Mat3 R_now_anchor = Mat3::Identity();  ///< rotation of the left camera
-  double depth_ratio = 1;                ///< depth now / depth then
-  Mat2 J_normalised_pixel_anchor = Mat2::Identity();
+  // since its reference was taken:
+  Mat3 R_now_reference = Mat3::Identity();  ///< rotation of the left camera
+  double depth_ratio = 1;                   ///< depth now / depth then
+  Mat2 J_normalised_pixel_reference = Mat2::Identity();
   std::array<Vec2, kHistory> history{};  ///< normalised positions, that of age a at a % kHistory
 
   Vec2& at_age(int age) { return history[static_cast<std::size_t>(age % kHistory)]; }
@@ -33,7 +33,7 @@ struct KltTrack : TrackState {
 
 struct KltPatches {
   KltTemplate newest;
-  KltAnchor anchor;
+  KltReference reference;
 };
 
 class KltFollower {
@@ -43,18 +43,18 @@ class KltFollower {
   /// False when it is lost.
   bool follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,
               const FrameImages& images, FrontendStats& stats);
-  /// Takes the newest image's patch as the anchor.
-  void set_anchor(KltTrack& track, KltPatches& patches, const Pyramid& left) const;
+  /// Takes the newest image's patch as the reference.
+  void set_reference(KltTrack& track, KltPatches& patches, const Pyramid& left) const;
 
  private:
   Vec2 predict(const KltTrack& track, const CameraMotion& motion, double typical_inverse_depth) const;
   bool carry(KltTrack& track, const Vec2& found_px, const CameraMotion& motion) const;
   KltResult align(const KltTrack& track, const KltTemplate& patch, const CameraMotion& motion, double typical_inverse_depth,
                   const Pyramid& left) const;
-  KltResult align_to_anchor(const KltTrack& track, const KltAnchor& anchor, const Vec2& start_px, const Pyramid& left);
+  KltResult align_to_reference(const KltTrack& track, const KltReference& reference, const Vec2& start_px, const Pyramid& left);
 
   Camera camera_;
-  KltTemplate warped_;  // of the anchor being used
+  KltTemplate warped_;  // of the reference being used
 };
 
 }  // namespace fbvins

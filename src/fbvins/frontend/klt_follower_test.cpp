@@ -26,7 +26,7 @@ struct Scene {
     track.normalised = wall.camera.undistort(track.px).value();
     track.inverse_depth = 1 / TestWall::kDepth_m;
     patches->newest.cut(images.left(), track.px, 0, kKltLevels - 1);
-    follower.set_anchor(track, *patches, images.left());
+    follower.set_reference(track, *patches, images.left());
     images.advance();
   }
   void take(std::shared_ptr<const Image> left) {

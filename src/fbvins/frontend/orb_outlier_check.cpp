@@ -10,7 +10,7 @@ void OrbOutlierCheck::judge(OrbTracks& tracks, const OrbView& view, const Motion
     if (then < 0) continue;
     const Time t_then = t_[static_cast<std::size_t>(then) % OrbTrack::kHistory];
     const CameraMotion motion = predictor.between(t_then, view.t);
-    const auto seen_then = [&](const OrbTrack& track) { return track.observed ? track.sighting(then) : nullptr; };
+    const auto seen_then = [&](const OrbTrack& track) { return track.observed ? track.position_in(then) : nullptr; };
     if (lag == 1) {
       motion_.gather(tracks, seen_then);
       motion_.judge(tracks, motion, (view.t - t_then).seconds(), stats);

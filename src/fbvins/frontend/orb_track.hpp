@@ -29,7 +29,7 @@ inline constexpr int kMostUnobserved = 200;
 struct OrbTrack : TrackState {
   /// Images over which outliers are looked for, the newest included.
   static constexpr std::size_t kHistory = 6;
-  struct Sighting {
+  struct PastPosition {
     Vec2 normalised = Vec2::Zero();
     std::int64_t image = -1;  // OrbView::index
   };
@@ -38,16 +38,16 @@ struct OrbTrack : TrackState {
   Descriptor raw;         ///< the same before it was improved
   int level = 0;          ///< of the scale pyramid, as last seen
   Time last_seen;
-  bool was_observed = false;            ///< in the image before
-  bool renew_reference = false;         ///< it no longer matches the patch with which it began
-  std::array<Sighting, kHistory> seen;  ///< of image i at i % kHistory
-  std::optional<Vec3> seen_from_G;      ///< position of the camera when it was last observed, m
-  std::optional<Vec3> p_G;              ///< position of its landmark, once that has left the estimator's window, m
+  bool was_observed = false;                ///< in the image before
+  bool renew_reference = false;             ///< it no longer matches the patch with which it began
+  std::array<PastPosition, kHistory> seen;  ///< of image i at i % kHistory
+  std::optional<Vec3> seen_from_G;          ///< position of the camera when it was last observed, m
+  std::optional<Vec3> p_G;                  ///< position of its landmark, once that has left the estimator's window, m
 
   void see(std::int64_t image) { seen[static_cast<std::size_t>(image) % kHistory] = {normalised, observed ? image : -1}; }
   /// Its position in that image; null if it was not observed.
-  const Vec2* sighting(std::int64_t image) const {
-    const Sighting& s = seen[static_cast<std::size_t>(image) % kHistory];
+  const Vec2* position_in(std::int64_t image) const {
+    const PastPosition& s = seen[static_cast<std::size_t>(image) % kHistory];
     return s.image == image ? &s.normalised : nullptr;
   }
 };

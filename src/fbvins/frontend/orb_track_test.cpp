@@ -66,10 +66,10 @@ TEST(OrbTrack, RemembersInWhichOfTheLastImagesItWasObserved) {
     track.observed = image != 11;
     track.see(image);
   }
-  ASSERT_NE(track.sighting(10), nullptr);
-  EXPECT_EQ(track.sighting(10)->x(), 10);
-  EXPECT_EQ(track.sighting(11), nullptr);
-  EXPECT_EQ(track.sighting(12 - static_cast<std::int64_t>(OrbTrack::kHistory)), nullptr) << "overwritten";
+  ASSERT_NE(track.position_in(10), nullptr);
+  EXPECT_EQ(track.position_in(10)->x(), 10);
+  EXPECT_EQ(track.position_in(11), nullptr);
+  EXPECT_EQ(track.position_in(12 - static_cast<std::int64_t>(OrbTrack::kHistory)), nullptr) << "overwritten";
 }
 
 TEST(OrbTrack, SettlesInsideTheImageOnly) {

@@ -4,20 +4,16 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/geometry/jacobian_check.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "fbvins/imu/integrated_test_motion.hpp"
 
 namespace fbvins {
 namespace imu_residual_test {
 
+using test::integrated;
+using test::kBias;
+using test::kFrom;
+using test::kTo;
 using test::Motion;
-constexpr Time kFrom{1'000'000'000}, kTo{1'500'000'000};
-const ImuBias kBias{Vec3(0.02, -0.03, 0.05), Vec3(0.1, -0.2, 0.15)};
-
-Preintegration integrated(const ImuSegment& segment, const ImuBias& bias, const ImuNoise& noise = {}) {
-  Preintegration p(noise, bias);
-  p.integrate(segment);
-  return p;
-}
 
 const std::vector<JacobianBlock> kBlocks = {{"p", 3}, {"theta", 3}, {"v", 3}, {"bg", 3}, {"ba", 3}};
 

@@ -19,6 +19,17 @@ void add_white_acceleration(double q, double dt, Mat9& noise) {
   noise.block<3, 3>(nav::v, nav::v).diagonal().array() += q * dt;
 }
 
+double squared(double x) { return x * x; }
+
+/// Covariance of the readings' white noise over a step: eq. P11.
+Mat9 noise_of_step(const ImuNoise& density, const ImuNoiseScale& scale, double dt) {
+  Mat9 noise = Mat9::Zero();
+  noise.block<3, 3>(nav::theta, nav::theta).diagonal().array() +=
+      squared(scale.gyro * density.gyro_noise_density_radps_rthz) * dt;
+  add_white_acceleration(squared(scale.accel * density.accel_noise_density_mps2_rthz), dt, noise);
+  return noise;
+}
+
 /// Covariance of the unknown deviation from a linear signal during a step inside an IMU gap: eq. P13.
 void add_gap(const ImuGapModel& model, double gap_s, double dt, Mat9& noise) {
   const double ratio = std::min(1.0, gap_s / model.long_gap_s);
@@ -124,11 +135,7 @@ void Preintegration::step(const Reading& from, const Reading& to) {
   J_theta_bg_ = Et * J_theta_bg_ + theta_bg;
 
   // Covariance (eq. P11): white noise of the readings, random walk of the biases, missing readings.
-  const auto squared = [](double x) { return x * x; };
-  Mat9 noise = Mat9::Zero();
-  noise.block<3, 3>(nav::theta, nav::theta).diagonal().array() +=
-      squared(to.noise.gyro * noise_.gyro_noise_density_radps_rthz) * dt;
-  add_white_acceleration(squared(to.noise.accel * noise_.accel_noise_density_mps2_rthz), dt, noise);
+  Mat9 noise = noise_of_step(noise_, to.noise, dt);
   if (to.gap_s > 0) add_gap(gap_model_, to.gap_s, dt, noise);
   const Mat9x15 FP = F * covariance_;
   covariance_.topLeftCorner<9, 9>() = FP * F.transpose() + noise;

@@ -3,21 +3,16 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/imu/imu_test_motion.hpp"
-#include "fbvins/imu/preintegration.hpp"
+#include "fbvins/imu/integrated_test_motion.hpp"
 
 namespace fbvins {
 namespace propagation_test {
 
+using test::integrated;
+using test::kBias;
+using test::kFrom;
+using test::kTo;
 using test::Motion;
-constexpr Time kFrom{1'000'000'000}, kTo{1'500'000'000};
-const ImuBias kBias{Vec3(0.02, -0.03, 0.05), Vec3(0.1, -0.2, 0.15)};
-
-Preintegration integrated(const ImuSegment& segment, const ImuBias& bias, const ImuNoise& noise = {}) {
-  Preintegration p(noise, bias);
-  p.integrate(segment);
-  return p;
-}
 
 TEST(Propagation, AgreesWithPreintegration) {
   const Motion motion;

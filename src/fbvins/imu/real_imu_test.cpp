@@ -132,7 +132,7 @@ TEST(RealImu, FindsRestOnV101) {
   const Quat R_WB_true = Quat(0.069433, -0.824237, -0.106942, -0.551702).normalized();
   for (std::size_t start = 0; start + 100 < imu.size(); start += 100) {
     const std::vector<ImuSample> window(imu.begin() + static_cast<long>(start), imu.begin() + static_cast<long>(start) + 101);
-    const RestEstimate r = initialise_at_rest(window, 0.2, {});
+    const RestEstimate r = initialise_at_rest(window, {});
     ASSERT_TRUE(r.at_rest) << "window at reading " << start << ": " << to_string(r.reason);
     EXPECT_LT(tilt_between(r.state, R_WB_true), 1.0 * kDegree);
     EXPECT_LT((r.state.bias.gyro_radps - truth[0].state.bias.gyro_radps).norm(), 0.01);
@@ -144,8 +144,7 @@ TEST(RealImu, MH01IsNotAtRestUntilItsEnd) {
   const auto imu = read_imu(data_folder() + "/MH_01_easy_17s/mav0/imu0/data.csv");
   if (imu.empty()) GTEST_SKIP() << "no data at " << data_folder();
   const auto rests = [&](std::size_t start) {
-    return initialise_at_rest({imu.begin() + static_cast<long>(start), imu.begin() + static_cast<long>(start) + 121}, 0.0, {})
-        .at_rest;
+    return initialise_at_rest({imu.begin() + static_cast<long>(start), imu.begin() + static_cast<long>(start) + 121}, {}).at_rest;
   };
   for (std::size_t start = 0; start < 2800; start += 60) EXPECT_FALSE(rests(start)) << "reading " << start;
   EXPECT_TRUE(rests(imu.size() - 130));

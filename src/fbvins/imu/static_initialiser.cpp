@@ -40,33 +40,10 @@ double longest_step_s(const std::vector<ImuSample>& window) {
   return longest.seconds();
 }
 
-/// Covariance of the state at rest (eq. A3-A5).
-Mat15 covariance_at_rest(const Vec3& up_B, double window_s, const ImuNoise& noise, const RestOptions& o, double g) {
-  const auto squared = [](double x) { return x * x; };
-  const double accel_noise = squared(noise.accel_noise_density_mps2_rthz) / window_s;
-  const double gyro_noise = squared(noise.gyro_noise_density_radps_rthz) / window_s;
-  const double bias = squared(o.accel_bias_sigma_mps2);
-  const Mat3 tilt_accel = hat(up_B) / g;  // tilt error by error of the specific force, eq. A3
-  const Mat3 yaw = squared(o.yaw_sigma_rad) * up_B * up_B.transpose();
-  const double tilt_floor = squared(1e-4);  // vibration and the like; keeps the matrix invertible
-  Mat15 P = Mat15::Zero();
-  P.diagonal().segment<3>(nav::p).setConstant(squared(o.position_sigma_m));
-  P.block<3, 3>(nav::theta, nav::theta) = (bias + accel_noise) * tilt_accel * tilt_accel.transpose() + yaw;
-  P.diagonal().segment<3>(nav::theta).array() += tilt_floor;
-  P.block<3, 3>(nav::theta, nav::ba) = bias * tilt_accel;
-  P.block<3, 3>(nav::ba, nav::theta) = bias * tilt_accel.transpose();
-  P.diagonal().segment<3>(nav::v).setConstant(squared(o.velocity_sigma_mps));
-  P.diagonal().segment<3>(nav::bg).setConstant(gyro_noise + squared(1e-4));
-  P.diagonal().segment<3>(nav::ba).setConstant(bias);
-  const Mat15 symmetric = 0.5 * (P + P.transpose());  // exactly, in spite of rounding
-  return symmetric;
-}
-
-RestRefusal judge(const Spread& s, double image_motion_px, const ImuNoise& noise, const RestOptions& o, double g) {
+RestRefusal judge(const Spread& s, const ImuNoise& noise, const RestOptions& o, double g) {
   const double root_block = std::sqrt(o.block_s);
   const double gyro_limit = std::max(o.max_gyro_spread_radps, o.noise_factor * noise.gyro_noise_density_radps_rthz / root_block);
   const double accel_limit = std::max(o.max_accel_spread_mps2, o.noise_factor * noise.accel_noise_density_mps2_rthz / root_block);
-  if (!(image_motion_px <= o.max_image_motion_px)) return RestRefusal::image_moves;
   if (!(s.gyro <= gyro_limit)) return RestRefusal::gyro_spread;
   if (!(s.accel <= accel_limit)) return RestRefusal::accel_spread;
   if (!(s.gyro_mean.norm() <= o.max_gyro_mean_radps)) return RestRefusal::gyro_mean;
@@ -81,7 +58,6 @@ std::string_view to_string(RestRefusal reason) {
     case RestRefusal::none: return "none";
     case RestRefusal::too_short: return "too_short";
     case RestRefusal::imu_gap: return "imu_gap";
-    case RestRefusal::image_moves: return "image_moves";
     case RestRefusal::gyro_spread: return "gyro_spread";
     case RestRefusal::accel_spread: return "accel_spread";
     case RestRefusal::gyro_mean: return "gyro_mean";
@@ -92,8 +68,8 @@ std::string_view to_string(RestRefusal reason) {
 
 Quat level_rotation(const Vec3& up_B) { return so3_between(up_B, Vec3::UnitZ()).normalized(); }
 
-RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, double image_motion_px, const ImuNoise& noise,
-                                const RestOptions& options, double gravity_mps2) {
+RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, const ImuNoise& noise, const RestOptions& options,
+                                double gravity_mps2) {
   RestEstimate r;
   const double window_s = window.empty() ? 0.0 : (window.back().t - window.front().t).seconds();
   if (window.size() < 3 || window_s < options.min_window_s) {
@@ -107,12 +83,11 @@ RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, double ima
   const Spread s = measure(window, options.block_s);
   r.gyro_spread_radps = s.gyro;
   r.accel_spread_mps2 = s.accel;
-  r.reason = judge(s, image_motion_px, noise, options, gravity_mps2);
+  r.reason = judge(s, noise, options, gravity_mps2);
   r.at_rest = r.reason == RestRefusal::none;
   if (!r.at_rest) return r;
   r.state.T_FB.q = level_rotation(s.accel_mean);  // eq. A2
   r.state.bias.gyro_radps = s.gyro_mean;
-  r.covariance = covariance_at_rest(s.accel_mean.normalized(), window_s, noise, options, gravity_mps2);
   return r;
 }
 

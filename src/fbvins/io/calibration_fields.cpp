@@ -171,4 +171,14 @@ ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::stri
   return noise;
 }
 
+std::string imu_noise_text(const ImuNoise& noise, const std::string& indent, fmt::string_view number) {
+  std::string out;
+  for (const auto& [field, value] : {std::pair("gyroscope_noise_density", noise.gyro_noise_density_radps_rthz),
+                                     {"gyroscope_random_walk", noise.gyro_random_walk_radps2_rthz},
+                                     {"accelerometer_noise_density", noise.accel_noise_density_mps2_rthz},
+                                     {"accelerometer_random_walk", noise.accel_random_walk_mps3_rthz}})
+    out += indent + field + ": " + fmt::vformat(number, fmt::make_format_args(value)) + "\n";
+  return out;
+}
+
 }  // namespace fbvins

@@ -2,6 +2,8 @@
 // Not public: what EuRoC's and Kalibr's calibration files have in common.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <string>
 #include <vector>
 
@@ -51,5 +53,7 @@ std::string depth_sensor_text(const DepthSensor& sensor, const std::string& inde
 
 /// The four noise figures; rate_field is "rate_hz" or "update_rate".
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field);
+/// The same as text, without the rate, each line after `indent`; `number`: how fmt writes one.
+std::string imu_noise_text(const ImuNoise& noise, const std::string& indent, fmt::string_view number);
 
 }  // namespace fbvins

@@ -130,7 +130,7 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
   EXPECT_EQ(message("cam0:", "cam2:"), "c.yaml: cam0: is missing or empty");
   EXPECT_EQ(parse_kalibr_camchain({"c.yaml", good.substr(0, good.find("cam1:")) + "cam1: 6\n"}).error().message,
             "c.yaml:14: cam1: is empty");
-  EXPECT_EQ(message("T_cam_imu", "T_imu_cam"), "c.yaml: T_cam_imu: is missing");
+  EXPECT_EQ(message("T_cam_imu", "T_imu_cam"), "c.yaml:2: T_cam_imu: is missing");
   EXPECT_EQ(message("distortion_model: equidistant", "distortion_model: fov"),
             "c.yaml:10: distortion_model: 'fov' is not supported, only radial-tangential, radtan, equidistant and none");
   EXPECT_EQ(message("[752, 480]", "[752.5, 480]"), "c.yaml:12: resolution: 752.5 is not a number of pixels");
@@ -195,7 +195,7 @@ TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
     EXPECT_EQ(noise->gyro_random_walk_radps2_rthz, 4.0e-06);
     EXPECT_EQ(noise->rate_hz, 200);
   }
-  EXPECT_EQ(parse_kalibr_imu({"imu.yaml", "imu0: {}\n"}).error().message, "imu.yaml: gyroscope_noise_density: is missing");
+  EXPECT_EQ(parse_kalibr_imu({"imu.yaml", "imu0: {}\n"}).error().message, "imu.yaml:1: gyroscope_noise_density: is missing");
 }
 
 TEST(Calibration, KalibrsImuMayLieInTheFileOfTheCameras) {

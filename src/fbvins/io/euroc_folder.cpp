@@ -65,11 +65,7 @@ std::string imu_yaml(const ImuNoise& n, const std::string& origin) {
   if (n.max_gyro_radps != usual.max_gyro_radps || n.max_accel_mps2 != usual.max_accel_mps2)
     range = fmt::format("gyroscope_range: {}\naccelerometer_range: {}\n", n.max_gyro_radps, n.max_accel_mps2);
   return fmt::format("sensor_type: imu\ncomment: {}\n\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero()) +
-         fmt::format(
-             "rate_hz: {}\n\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
-             n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
-             n.accel_random_walk_mps3_rthz) +
-         range;
+         fmt::format("rate_hz: {}\n\n", n.rate_hz) + imu_noise_text(n, "", "{}") + range;
 }
 
 std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {

@@ -95,8 +95,8 @@ std::vector<std::string> images_to_try(const std::vector<FrameEntry>& frames,
 Result<void> check_images(const DatasetContents& contents) {
   for (int i = 0; i < contents.rig.camera_count(); ++i)
     if (Result<void> good = check_camera(contents, i); !good) {
-      const bool mended = scaled_to_images(contents).has_value();
-      return Error{good.error().code, good.error().message + (mended ? "; `fbvins doctor --fix` scales a calibration" : "")};
+      const bool scales = scaled_to_images(contents).has_value();
+      return Error{good.error().code, good.error().message + (scales ? "; `fbvins doctor --fix` scales a calibration" : "")};
     }
   return check_sensor(
       contents, "depth", [](const FrameEntry& f) { return f.depth_file; },

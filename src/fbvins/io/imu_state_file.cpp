@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <charconv>
 #include <filesystem>
 
@@ -41,8 +40,10 @@ Mat3 read_covariance(YamlReader& yaml, const char* field) {
   const std::vector<double> v = yaml.numbers(yaml.root(), field, 6);
   Mat3 m;
   m << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
-  const bool covariance =
-      m.allFinite() && Eigen::SelfAdjointEigenSolver<Mat3>(m, Eigen::EigenvaluesOnly).eigenvalues().minCoeff() >= 0;
+  // No principal minor is negative; a decomposition has no place in a module that is not optimised.
+  const auto minor = [&](int i, int j) { return m(i, i) * m(j, j) - m(i, j) * m(i, j); };
+  const bool covariance = m.allFinite() && m.diagonal().minCoeff() >= 0 && minor(0, 1) >= 0 && minor(0, 2) >= 0 &&
+                          minor(1, 2) >= 0 && m.determinant() >= 0;
   if (!covariance) yaml.complain(yaml.root(), field, "is not a covariance");
   return m;
 }
@@ -93,14 +94,13 @@ Result<std::optional<ImuState>> read_imu_state(const std::string& path, const Im
 std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
   const ImuBiasEstimate& b = state.biases;
   return fmt::format(
-      "# Biases of an IMU at the end of a flight (fbvins --imu-state), for the next one; covariances as upper triangles.\n"
-      "imu_state: 1\nt_ns: {}\n"
-      "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
-      "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
-      "gyro_bias_radps: {}\naccel_bias_mps2: {}\ngyro_bias_covariance: {}\naccel_bias_covariance: {}\n",
-      state.t.ns, n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
-      n.accel_random_walk_mps3_rthz, list(b.bias.gyro_radps.data(), 3), list(b.bias.accel_mps2.data(), 3),
-      upper(b.gyro_covariance), upper(b.accel_covariance));
+             "# Biases of an IMU at the end of a flight (fbvins --imu-state), for the next one; covariances as upper triangles.\n"
+             "imu_state: 1\nt_ns: {}\nimu:\n  rate_hz: {:.17g}\n",
+             state.t.ns, n.rate_hz) +
+         imu_noise_text(n, "  ", "{:.17g}") +
+         fmt::format("gyro_bias_radps: {}\naccel_bias_mps2: {}\ngyro_bias_covariance: {}\naccel_bias_covariance: {}\n",
+                     list(b.bias.gyro_radps.data(), 3), list(b.bias.accel_mps2.data(), 3), upper(b.gyro_covariance),
+                     upper(b.accel_covariance));
 }
 
 Result<void> write_imu_state(const std::string& path, const ImuState& state, const ImuNoise& imu) {

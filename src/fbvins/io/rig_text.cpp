@@ -78,13 +78,10 @@ std::string rig_to_yaml(const StereoRig& rig) {
          "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
          camera_text("left", rig.left) + (rig.has_right() ? camera_text("right", rig.right) : "") +
          pose_text("T_BC0", rig.T_BC0) + (rig.has_right() ? pose_text("T_BC1", rig.T_BC1) : "") + further_cameras_text(rig) +
+         fmt::format("imu:\n  rate_hz: {:.17g}\n", n.rate_hz) + imu_noise_text(n, "  ", "{:.17g}") +
          fmt::format(
-             "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
-             "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
-             "  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\n"
-             "image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
-             n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
-             n.accel_random_walk_mps3_rthz, n.max_gyro_radps, n.max_accel_mps2, rig.image_rate_hz, rig.time_offset_s) +
+             "  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\nimage_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
+             n.max_gyro_radps, n.max_accel_mps2, rig.image_rate_hz, rig.time_offset_s) +
          (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s)) +
          (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "");
 }

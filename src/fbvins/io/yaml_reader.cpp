@@ -49,9 +49,9 @@ YAML::Node YamlReader::get(const YAML::Node& map, const std::string& field) cons
 void YamlReader::complain(const YAML::Node& map, const std::string& field, const std::string& sentence) {
   if (!ok()) return;
   const YAML::Node node = get(map, field);
-  const int line = node.IsDefined() ? node.Mark().line : map.IsDefined() ? map.Mark().line : -1;
-  error_.message = line >= 0 && node.IsDefined() ? fmt::format("{}:{}: {}: {}", file_, line + 1, field, sentence)
-                                                 : fmt::format("{}: {}: {}", file_, field, sentence);
+  const YAML::Node& where = node.IsDefined() ? node : map;
+  if (where.IsDefined() && !where.is(root_)) complain(where, fmt::format("{}: {}", field, sentence));
+  else error_.message = fmt::format("{}: {}: {}", file_, field, sentence);
 }
 
 void YamlReader::complain(const YAML::Mark& mark, const std::string& sentence) {

@@ -18,7 +18,7 @@ constexpr double kBack_s = 0.1;
 constexpr int kFewestMisfits = 3;
 constexpr double kShortestMisfit_s = 0.25, kPaceShare = 0.2, kPaceJitter_s = 0.05;
 /// Camera and IMU share a clock: two jumps that agree within these are the same one.
-constexpr double kSameLeap_s = 0.05, kSameLeapWithin_s = 5;
+constexpr double kSameJump_s = 0.05, kSameJumpWithin_s = 5;
 constexpr double kWindow_s = 5;
 /// Two stamps are in step if they are this much apart, at most, from what passed between them.
 constexpr double kInStep_s = 0.1;
@@ -52,7 +52,7 @@ std::optional<ClockGuard::Event> ClockGuard::correct(Stream stream, Time raw, Ti
   if (!fits(s, raw + s.correction, host) || continues(s.misfits, raw, host)) {
     if (!go_on_as_a_clock(s.misfits, raw, host)) return std::nullopt;
     const Duration before = s.correction;
-    s.correction = correction_after_leap(stream, raw, host);
+    s.correction = correction_after_jump(stream, raw, host);
     s.correction_before = before;
     s.jumped_host = host;
     ++jumps_;
@@ -119,14 +119,14 @@ bool ClockGuard::go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const {
 
 /// Puts the stamp a whole number of periods after the stream's newest one, by the time that has passed; or the other stream's
 /// correction, where that has jumped just now by about the same; or the correction of before, where the clock jumped back.
-Duration ClockGuard::correction_after_leap(Stream stream, Time raw, Time host) const {
+Duration ClockGuard::correction_after_jump(Stream stream, Time raw, Time host) const {
   const State &s = states_[stream], &other = states_[1 - stream];
   const double passed_s = (host - *s.newest_host).seconds() * rate_;
   const double period_s = s.period.median().value_or(Duration::from_seconds(std::max(passed_s, 1e-3))).seconds();
   const double steps = std::max(1.0, std::round(passed_s / period_s));
   const Duration own = *s.newest + Duration::from_seconds(steps * period_s) - raw;
-  const bool other_jumped = (host - other.jumped_host).seconds() < kSameLeapWithin_s;
-  const auto about = [&](Duration d) { return std::abs((own - d).seconds()) < kSameLeap_s; };
+  const bool other_jumped = (host - other.jumped_host).seconds() < kSameJumpWithin_s;
+  const auto about = [&](Duration d) { return std::abs((own - d).seconds()) < kSameJump_s; };
   if (other_jumped && about(other.correction)) return other.correction;
   return about(s.correction_before) ? s.correction_before : own;
 }

@@ -81,7 +81,7 @@ class ClockGuard {
   bool fits(const State& s, Time t, Time host) const;
   bool continues(const Misfits& misfits, Time raw, Time host) const;
   bool go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const;
-  Duration correction_after_leap(Stream stream, Time raw, Time host) const;
+  Duration correction_after_jump(Stream stream, Time raw, Time host) const;
   void learn(State& s, Time t, Time host);
   double lateness_s(Time t, Time host) const;
   double shortest_lateness_s() const;

@@ -10,17 +10,17 @@ namespace clock_guard_test {
 
 Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
 
-/// IMU at 200 Hz and images at 20 Hz over `seconds`, in order; `leap` and `delay` are functions of the time of the event.
+/// IMU at 200 Hz and images at 20 Hz over `seconds`, in order; `jump` and `delay` are functions of the time of the event.
 /// How many were not given a stamp.
-template <class Leap, class Delay>
-int play(ClockGuard& guard, double seconds, const Leap& leap, const Delay& delay, double& worst_s, double rate = 1) {
+template <class Jump, class Delay>
+int play(ClockGuard& guard, double seconds, const Jump& jump, const Delay& delay, double& worst_s, double rate = 1) {
   int refused = 0;
   for (int k = 0; k < seconds * 200; ++k) {
     const double s = k * 0.005;
     const double stamp = 1000 + s * rate;
     const Time host = at(50 + s + delay(s));
     const auto give = [&](ClockGuard::Stream stream) {
-      if (const auto event = guard.correct(stream, at(stamp + leap(s)), host)) {
+      if (const auto event = guard.correct(stream, at(stamp + jump(s)), host)) {
         worst_s = std::max(worst_s, std::abs((event->t - at(stamp)).seconds()));
         refused -= event->held_back + event->other_too;
       } else {
@@ -33,36 +33,36 @@ int play(ClockGuard& guard, double seconds, const Leap& leap, const Delay& delay
   return refused;
 }
 
-const auto no_leap = [](double) { return 0.0; };
+const auto no_jump = [](double) { return 0.0; };
 const auto no_delay = [](double) { return 0.001; };
 
 TEST(ClockGuard, LeavesStampsAlone) {
   ClockGuard guard(1);
   double worst_s = 0;
-  play(guard, 20, no_leap, no_delay, worst_s);
+  play(guard, 20, no_jump, no_delay, worst_s);
   EXPECT_EQ(worst_s, 0);
   EXPECT_EQ(guard.jumps(), 0);
 }
 
-TEST(ClockGuard, LateAndBunchedDataAreNoLeap) {
+TEST(ClockGuard, LateAndBunchedDataAreNoJump) {
   ClockGuard guard(1);
   double worst_s = 0;
   // All events of half a second arrive at its end.
   play(
-      guard, 20, no_leap, [](double s) { return std::ceil(s * 2) / 2 - s; }, worst_s);
+      guard, 20, no_jump, [](double s) { return std::ceil(s * 2) / 2 - s; }, worst_s);
   EXPECT_EQ(worst_s, 0);
   EXPECT_EQ(guard.jumps(), 0);
 }
 
-TEST(ClockGuard, AClockThatDriftsIsNoLeap) {
+TEST(ClockGuard, AClockThatDriftsIsNoJump) {
   ClockGuard guard(1);
   double worst_s = 0;
   play(
-      guard, 4000, no_leap, [](double s) { return 0.001 - 1e-4 * s; }, worst_s);  // 100 ppm, in all 0.4 s
+      guard, 4000, no_jump, [](double s) { return 0.001 - 1e-4 * s; }, worst_s);  // 100 ppm, in all 0.4 s
   EXPECT_EQ(guard.jumps(), 0);
 }
 
-TEST(ClockGuard, LeapsForwardAndBackAreMended) {
+TEST(ClockGuard, JumpsForwardAndBackAreCorrected) {
   for (const double size_s : {1.0, -1.0, 0.3, -0.3, 0.22, 86400.0, -999.0}) {
     ClockGuard guard(1);
     double worst_s = 0;
@@ -74,16 +74,16 @@ TEST(ClockGuard, LeapsForwardAndBackAreMended) {
   }
 }
 
-TEST(ClockGuard, CameraAndImuLeapByTheSame) {
+TEST(ClockGuard, CameraAndImuJumpByTheSame) {
   ClockGuard guard(1);
-  // The camera's stamps jitter: alone it would put the leap some milliseconds off the IMU's.
+  // The camera's stamps jitter: alone it would put the jump some milliseconds off the IMU's.
   double between_s = 0;
   for (int k = 0; k < 4000; ++k) {
-    const double s = k * 0.005, leap = s > 10 ? 5.0 : 0.0;
-    const auto imu = guard.correct(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
+    const double s = k * 0.005, jump = s > 10 ? 5.0 : 0.0;
+    const auto imu = guard.correct(ClockGuard::imu, at(1000 + s + jump), at(50 + s));
     if (k % 10 != 0) continue;
     const double jitter_s = 0.003 * std::sin(k);
-    const auto image = guard.correct(ClockGuard::camera, at(1000 + s + leap + jitter_s), at(50 + s));
+    const auto image = guard.correct(ClockGuard::camera, at(1000 + s + jump + jitter_s), at(50 + s));
     if (image && imu) between_s = std::max(between_s, std::abs((image->t - imu->t).seconds() - jitter_s));
   }
   EXPECT_LT(between_s, 1e-6);
@@ -92,7 +92,7 @@ TEST(ClockGuard, CameraAndImuLeapByTheSame) {
 TEST(ClockGuard, ADeviceThatStartsAnewAfterASilenceGoesOnWhereTimeIs) {
   ClockGuard guard(1);
   double worst_s = 0;
-  play(guard, 10, no_leap, no_delay, worst_s);
+  play(guard, 10, no_jump, no_delay, worst_s);
   // Four seconds later, with stamps from zero.
   std::optional<ClockGuard::Event> corrected;
   int k = 0;
@@ -113,7 +113,7 @@ struct Late {
   double late_s;        ///< its stamp is earlier by this
 };
 
-TEST(ClockGuard, LateOrWrongStampsAreNoLeap) {
+TEST(ClockGuard, LateOrWrongStampsAreNoJump) {
   for (const Late& c : {Late{"one reading", ClockGuard::imu, [](int k) { return k == 2000; }, 0.15},
                         Late{"one image", ClockGuard::camera, [](int k) { return k == 200; }, 0.18},
                         Late{"one reading, early", ClockGuard::imu, [](int k) { return k == 2000; }, -0.15},
@@ -175,21 +175,21 @@ TEST(ClockGuard, ACameraThatBeginsAloneMayBeginWithAWrongStamp) {
 TEST(ClockGuard, AStreamThatBeginsAfterAJumpHasJumpedToo) {
   ClockGuard guard(1);
   for (int k = 0; k < 4000; ++k) {
-    const double s = k * 0.005, leap = s > 5 ? 100 : 0;
-    (void)guard.correct(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
+    const double s = k * 0.005, jump = s > 5 ? 100 : 0;
+    (void)guard.correct(ClockGuard::imu, at(1000 + s + jump), at(50 + s));
     if (s < 10 || k % 10 != 0) continue;
-    const auto image = guard.correct(ClockGuard::camera, at(1000 + s + leap), at(50 + s));
+    const auto image = guard.correct(ClockGuard::camera, at(1000 + s + jump), at(50 + s));
     ASSERT_TRUE(image);
     EXPECT_EQ(image->t, at(1000 + s));
   }
 }
 
 /// A transport that had been slow for long: no reading is lost, and the clock has not jumped.
-TEST(ClockGuard, ATransportThatBecomesFasterIsNoLeap) {
+TEST(ClockGuard, ATransportThatBecomesFasterIsNoJump) {
   ClockGuard guard(1);
   double worst_s = 0;
   const int refused = play(
-      guard, 40, no_leap, [](double s) { return s < 20 ? 0.15 : 0.001; }, worst_s);
+      guard, 40, no_jump, [](double s) { return s < 20 ? 0.15 : 0.001; }, worst_s);
   EXPECT_EQ(guard.jumps(), 0);
   EXPECT_EQ(worst_s, 0);
   EXPECT_EQ(refused, 0);
@@ -197,7 +197,7 @@ TEST(ClockGuard, ATransportThatBecomesFasterIsNoLeap) {
 }
 
 /// Readings of 200 ms that arrive in one block, after newer ones.
-TEST(ClockGuard, ABlockOfLateReadingsIsNoLeap) {
+TEST(ClockGuard, ABlockOfLateReadingsIsNoJump) {
   ClockGuard guard(1);
   const auto give = [&](int k, int now) { return guard.correct(ClockGuard::imu, at(1000 + 0.005 * k), at(50 + 0.005 * now)); };
   for (int k = 0; k < 400; ++k) (void)give(k, k);
@@ -215,8 +215,8 @@ TEST(ClockGuard, AJumpBackIsUndoneExactly) {
   ClockGuard guard(1);
   std::optional<ClockGuard::Event> last;
   for (int k = 0; k < 6000; ++k) {
-    const double s = k * 0.005, leap = s > 10 && s < 20 ? 3 : 0, jitter_s = 0.002 * std::sin(7.0 * k);
-    last = guard.correct(ClockGuard::imu, at(1000 + s + leap), at(50.003 + s + jitter_s));
+    const double s = k * 0.005, jump = s > 10 && s < 20 ? 3 : 0, jitter_s = 0.002 * std::sin(7.0 * k);
+    last = guard.correct(ClockGuard::imu, at(1000 + s + jump), at(50.003 + s + jitter_s));
   }
   EXPECT_EQ(guard.jumps(), 2);
   ASSERT_TRUE(last);
@@ -244,14 +244,14 @@ TEST(ClockGuard, SaysWhenAStampWasOnThisMachine) {
   ClockGuard guard(1);
   double worst_s = 0;
   play(
-      guard, 20, no_leap, [](double s) { return 0.002 + 0.01 * std::abs(std::sin(17 * s)); }, worst_s);
+      guard, 20, no_jump, [](double s) { return 0.002 + 0.01 * std::abs(std::sin(17 * s)); }, worst_s);
   EXPECT_NEAR(guard.host_of(at(1020)).seconds(), 70.002, 5e-4);
 }
 
-TEST(ClockGuard, ARecordingPlayedFasterIsNoLeap) {
+TEST(ClockGuard, ARecordingPlayedFasterIsNoJump) {
   ClockGuard guard(4);
   double worst_s = 0;
-  play(guard, 20, no_leap, no_delay, worst_s, 4);
+  play(guard, 20, no_jump, no_delay, worst_s, 4);
   EXPECT_EQ(guard.jumps(), 0);
   EXPECT_NEAR(guard.host_of(at(1040)).seconds(), 60.001, 1e-6);
 }

@@ -68,18 +68,18 @@ void break_blocks(Image& image, double share, Rng& rng) {
 
 }  // namespace
 
-void ImageSpoiler::see(const StereoFrame& frame) {
+void ImageFaultInjector::see(const StereoFrame& frame) {
   before_.push_back(frame);
   if (before_.size() > kMostInCycle + 1) before_.pop_front();
 }
 
 template <class Change>
-void ImageSpoiler::each_image(StereoFrame& frame, Change&& change) const {
+void ImageFaultInjector::each_image(StereoFrame& frame, Change&& change) const {
   for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i)
     if (camera_ == kAllCameras || camera_ == i) change(*image_in(frame, i), i);
 }
 
-void ImageSpoiler::alter(StereoFrame& frame) {
+void ImageFaultInjector::alter(StereoFrame& frame) {
   const bool first = count_ == 0;
   const StereoFrame& previous = before_.size() > 1 ? before_[before_.size() - 2] : before_.back();
   if (first) held_ = previous;
@@ -117,7 +117,7 @@ void ImageSpoiler::alter(StereoFrame& frame) {
   });
 }
 
-void ImageSpoiler::alter_pixels(Image& image) {
+void ImageFaultInjector::alter_pixels(Image& image) {
   const int w = image.width();
   const auto fill = [&](double value) { each_pixel(image, [=](int, int, std::uint8_t) { return grey(value); }); };
   switch (fault_) {

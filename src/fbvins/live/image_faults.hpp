@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What broken, covered, badly lit or mixed-up cameras deliver.
 //
-//   ImageSpoiler spoiler(ImageFault::dark, kAllCameras, 0.03, seed);
-//   spoiler.see(frame);                  // every good frame
-//   if (broken) spoiler.alter(frame);    // and then those of the fault
+//   ImageFaultInjector injector(ImageFault::dark, kAllCameras, 0.03, seed);
+//   injector.see(frame);                  // every good frame
+//   if (broken) injector.alter(frame);    // and then those of the fault
 #pragma once
 
 #include <deque>
@@ -49,9 +49,9 @@ inline std::shared_ptr<const Image>* image_in(StereoFrame& frame, int camera) {
 }
 
 /// A value; the same calls give the same bits.
-class ImageSpoiler {
+class ImageFaultInjector {
  public:
-  ImageSpoiler(ImageFault fault, int camera, double amount, std::uint64_t seed)
+  ImageFaultInjector(ImageFault fault, int camera, double amount, std::uint64_t seed)
       : fault_(fault), camera_(camera), amount_(amount), rng_(seed, 12) {}
   /// The next frame, unaltered.
   void see(const StereoFrame& frame);

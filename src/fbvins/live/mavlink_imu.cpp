@@ -12,9 +12,9 @@ constexpr Duration kRequestEvery{1'000'000'000}, kQuiet{1'000'000'000};
 /// Stamps further ahead of their arrival, or further behind, are of a clock that is not known yet. The limit behind is larger:
 /// on a busy machine readings wait in the port, and are still good.
 constexpr Duration kFarthestAhead{500'000'000}, kLatest{2'000'000'000};
-/// Largest rate at which the offset follows its estimate, s/s; for differences beyond kLeap it jumps.
+/// Largest rate at which the offset follows its estimate, s/s; for differences beyond kJump it jumps.
 constexpr double kRamp = 1e-3;
-constexpr Duration kLeap{20'000'000};
+constexpr Duration kJump{20'000'000};
 constexpr double kStandardGravity_mps2 = 9.80665;
 constexpr MavlinkAddress kUs{1, 197};
 /// After this many unanswered requests for HIGHRES_IMU, SCALED_IMU is requested as well.
@@ -49,7 +49,7 @@ CommandMessage interval_request(std::uint32_t message, const MavlinkAddress& to)
 
 Duration SteadyOffset::at(Time now, Duration wanted) {
   const Duration off = wanted - value_;
-  if (!begun_ || std::abs(off.ns) > kLeap.ns) {
+  if (!begun_ || std::abs(off.ns) > kJump.ns) {
     value_ = wanted;
   } else {
     const auto most = static_cast<std::int64_t>(kRamp * static_cast<double>(std::max<std::int64_t>((now - at_).ns, 0)));

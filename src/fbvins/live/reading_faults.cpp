@@ -17,21 +17,21 @@ constexpr std::uint32_t kReadingsForSpike = 50;
 constexpr int kRepeats = 4;
 
 Vec3 random_direction(Rng& rng) {
-  const Vec3 v(rng.normal(), rng.normal(), rng.normal());
-  return v.normalized();
+  const double z = rng.normal(), y = rng.normal();
+  return Vec3(rng.normal(), y, z).normalized();
 }
 
 Vec3 normal3(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
 
 }  // namespace
 
-ReadingSpoiler::ReadingSpoiler(ReadingFault fault, double amount, std::uint64_t seed)
+ReadingFaultInjector::ReadingFaultInjector(ReadingFault fault, double amount, std::uint64_t seed)
     : fault_(fault), amount_(amount), rng_(seed, 11), axis_(static_cast<int>(rng_.below(3))), direction_(random_direction(rng_)) {
   for (Tone& tone : tones_)
     tone = {rng_.uniform(80, 200), rng_.uniform(0, 2 * std::numbers::pi), random_direction(rng_), random_direction(rng_)};
 }
 
-void ReadingSpoiler::alter(ImuSample& sample) {
+void ReadingFaultInjector::alter(ImuSample& sample) {
   if (!first_) first_ = sample;
   const double since_s = (sample.t - first_->t).seconds();
   Vec3 &gyro = sample.gyro_radps, &accel = sample.accel_mps2;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a broken, badly mounted or overloaded IMU does to the numbers of its readings.
 //
-//   ReadingSpoiler spoiler(ReadingFault::vibration, 5, seed);
-//   spoiler.alter(sample);               // each reading from the fault's beginning on
+//   ReadingFaultInjector injector(ReadingFault::vibration, 5, seed);
+//   injector.alter(sample);               // each reading from the fault's beginning on
 #pragma once
 
 #include <optional>
@@ -35,9 +35,9 @@ enum class ReadingFault {
 };
 
 /// A value; the same calls give the same bits.
-class ReadingSpoiler {
+class ReadingFaultInjector {
  public:
-  ReadingSpoiler(ReadingFault fault, double amount, std::uint64_t seed);
+  ReadingFaultInjector(ReadingFault fault, double amount, std::uint64_t seed);
   void alter(ImuSample& sample);
 
  private:

@@ -163,7 +163,8 @@ Result<SensorFault> parse_fault(const std::string& text) {
 
 FaultyInput::FaultyInput(SensorInput& input, std::vector<SensorFault> faults, std::uint64_t seed) : input_(input), rng_(seed) {
   for (const SensorFault& f : faults)
-    injected_.push_back({f, ReadingSpoiler(f.reading, f.amount, seed), ImageSpoiler(f.image, f.camera, f.amount, seed)});
+    injected_.push_back(
+        {f, ReadingFaultInjector(f.reading, f.amount, seed), ImageFaultInjector(f.image, f.camera, f.amount, seed)});
 }
 
 bool FaultyInput::active(const SensorFault& fault, Time t) const {

@@ -77,8 +77,8 @@ class FaultyInput final : public SensorInput {
  private:
   struct Injected {
     SensorFault fault;
-    ReadingSpoiler reading;
-    ImageSpoiler image;
+    ReadingFaultInjector reading;
+    ImageFaultInjector image;
   };
   bool active(const SensorFault& fault, Time t) const;
   const SensorFault* active(SensorFault::Kind kind, Time t) const;

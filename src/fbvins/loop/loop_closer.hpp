@@ -19,8 +19,8 @@
 
 #include "fbvins/loop/anchor_fit.hpp"
 #include "fbvins/loop/candidate_search.hpp"
-#include "fbvins/loop/flight_anchors.hpp"
 #include "fbvins/loop/flight_join.hpp"
+#include "fbvins/loop/flight_keyframes.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_frame.hpp"
 #include "fbvins/loop/odometry_drift.hpp"
@@ -121,7 +121,7 @@ class LoopCloser final : public Mapper {
   MapFrameFollower follower_;
   Relocaliser relocaliser_;
   Thinning thinning_;
-  FlightAnchors flight_;
+  FlightKeyframes flight_;
   RecentMotion motion_;
   Session session_;
   int news_since_optimised_ = 0;                                 ///< loops, and keyframes with anchors

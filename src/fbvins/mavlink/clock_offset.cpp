@@ -18,7 +18,7 @@ constexpr Time kLatestClock{3'800'000'000'000'000'000};
 /// Whether the offset differs by more than a delay on one of the two ways alone could explain.
 bool ClockOffset::jumped(const Answer& answer) const {
   const std::int64_t off = std::abs((answer.offset - value_).ns);
-  return off > answer.round_trip.ns / 2 + kLeap.ns;
+  return off > answer.round_trip.ns / 2 + kJump.ns;
 }
 
 void ClockOffset::add(Time asked, Time theirs, Time answered) {
@@ -29,12 +29,12 @@ void ClockOffset::add(Time asked, Time theirs, Time answered) {
   answer.offset = theirs - Time{asked.ns + answer.round_trip.ns / 2};
 
   if (!answers_.empty() && jumped(answer)) {
-    strays_.push_back(answer);
-    if (strays_.size() < kLeapAnswers) return;
-    answers_ = std::exchange(strays_, {});
+    outliers_.push_back(answer);
+    if (outliers_.size() < kJumpAnswers) return;
+    answers_ = std::exchange(outliers_, {});
     ++jumps_;
   } else {
-    strays_.clear();
+    outliers_.clear();
     answers_.push_back(answer);
     if (answers_.size() > kKept) answers_.pop_front();
   }

@@ -53,7 +53,7 @@ TEST(ClockOffset, FollowsADrift) {
   EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 5);
 }
 
-TEST(ClockOffset, ALeapIsTakenAfterThreeAnswersAndIsNotKnownBeforeEnoughOfThem) {
+TEST(ClockOffset, AJumpIsTakenAfterThreeAnswersAndIsNotKnownBeforeEnoughOfThem) {
   Cable cable;
   ClockOffset offset;
   for (int i = 0; i < 40; ++i) cable.ask(offset, Duration{5'000'000 * kMs});

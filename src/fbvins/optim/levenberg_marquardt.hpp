@@ -53,14 +53,14 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
       return summary;
     }
     bool accepted = false, converged = false;
-    double decrease = 0, promised = 0;
+    double decrease = 0, predicted = 0;
     for (int retry = 0; !accepted && !converged && retry < options.max_retries; ++retry) {
       if (problem.solve(lambda)) {
         const double trial = problem.apply_step();
-        promised = problem.predicted_decrease();
+        predicted = problem.predicted_decrease();
         decrease = cost - trial;
-        converged = problem.step_size() < options.min_step || promised < options.min_decrease;
-        accepted = std::isfinite(trial) && decrease > 1e-3 * promised;
+        converged = problem.step_size() < options.min_step || predicted < options.min_decrease;
+        accepted = std::isfinite(trial) && decrease > 1e-3 * predicted;
         if (accepted) {
           summary.final_cost = trial;
           lambda = std::max(lambda / 5, options.initial_lambda);
@@ -75,7 +75,7 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
       summary.usable = i > 0 || converged;
       return summary;
     }
-    if (converged || decrease < options.min_decrease || std::abs(promised - decrease) < options.min_decrease) return summary;
+    if (converged || decrease < options.min_decrease || std::abs(predicted - decrease) < options.min_decrease) return summary;
   }
   return summary;
 }

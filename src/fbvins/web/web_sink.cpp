@@ -131,7 +131,7 @@ void WebSink::show(const Odometry& o) {
   {
     const std::lock_guard lock(mutex_);
     history_.add(t_s, o, view);
-    if (silent_) untold_ = o;
+    if (silent_) unsent_ = o;
     else if (send_state) send(last_state_ = state_message(t_s, o, view, history_));
   }
   if (!pictures_.empty() && pictures_.front().t <= o.t) send_pictures(t_s);
@@ -203,12 +203,12 @@ void WebSink::end_replay() {
   const std::lock_guard lock(mutex_);
   silent_ = false;
   state_due_ = points_due_ = picture_due_ = {};  // the next image is shown, however soon it comes
-  const bool same = untold_ && view_ && view_->t == untold_->t;
+  const bool same = unsent_ && view_ && view_->t == unsent_->t;
   const LiveView* view = same ? &*view_ : nullptr;
-  const double t_s = untold_ ? (untold_->t - *start_).seconds() : 0;
-  if (untold_) last_state_ = state_message(t_s, *untold_, view, history_);
+  const double t_s = unsent_ ? (unsent_->t - *start_).seconds() : 0;
+  if (unsent_) last_state_ = state_message(t_s, *unsent_, view, history_);
   if (view) last_points_ = points_message(t_s, view->landmarks, false);
-  untold_.reset();
+  unsent_.reset();
   send(rewound_message());
   for (SharedMessage& message : flight_so_far()) send(std::move(message));
 }

@@ -85,7 +85,7 @@ class WebSink final : public Sink {
   FlightHistory history_;
   std::optional<Time> start_;
   bool silent_ = false;
-  std::optional<Odometry> untold_;  ///< the newest since begin_replay()
+  std::optional<Odometry> unsent_;  ///< the newest since begin_replay()
   SharedMessage last_state_, last_status_, last_map_, last_points_, last_replay_;
   std::map<int, SharedMessage> last_images_;  ///< by camera
 

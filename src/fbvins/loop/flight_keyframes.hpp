@@ -3,7 +3,7 @@
 // the map although keyframes are removed from it. Of a flight of many hours, older keyframes are left out: memory and time stay
 // bounded, and poses between those that are kept are interpolated. One thread at a time.
 //
-//   FlightAnchors flight;
+//   FlightKeyframes flight;
 //   flight.add(t, id);
 //   flight.hand_over(gone.id, successor.id, successor.T_MB.inverse() * gone.T_MB);
 //   Trajectory<M> in_map = flight.corrected(map, trajectory_in_G);
@@ -16,7 +16,7 @@
 
 namespace fbvins {
 
-class FlightAnchors {
+class FlightKeyframes {
  public:
   void add(Time t, KeyframeId id);
   std::size_t size() const { return entries_.size(); }
@@ -31,8 +31,8 @@ class FlightAnchors {
  private:
   struct Entry {
     Time t;
-    KeyframeId anchor;
-    Pose<B, B> T_anchor_B;
+    KeyframeId kept;
+    Pose<B, B> T_kept_B;
   };
   std::vector<Entry> entries_;
 };

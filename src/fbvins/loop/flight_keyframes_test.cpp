@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/loop/flight_anchors.hpp"
+#include "fbvins/loop/flight_keyframes.hpp"
 
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace flight_anchors_test {
+namespace flight_keyframes_test {
 
 Pose<G, B> in_G(double x) { return {Quat::Identity(), Vec3(x, 0, 0)}; }
 
-class Anchors : public testing::Test {
+class KeyframesOfAFlight : public testing::Test {
  protected:
   /// Keyframes at 0, 1, 2, 3 s, a metre apart in W; the map has them 1.1 m apart.
   void SetUp() override {
@@ -38,10 +38,10 @@ class Anchors : public testing::Test {
   }
 
   PlaceMap map_;
-  FlightAnchors flight_;
+  FlightKeyframes flight_;
 };
 
-TEST_F(Anchors, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
+TEST_F(KeyframesOfAFlight, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
   ASSERT_EQ(corrected().size(), 7u);
   EXPECT_NEAR(x_at(0), 0, 1e-12);
   EXPECT_NEAR(x_at(4), 2.2, 1e-12);
@@ -49,7 +49,7 @@ TEST_F(Anchors, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) 
   EXPECT_NEAR(x_at(6), 3.3 + 1, 1e-12);
 }
 
-TEST_F(Anchors, PosesOfARemovedKeyframeFollowItsHeir) {
+TEST_F(KeyframesOfAFlight, PosesOfARemovedKeyframeFollowItsHeir) {
   const Pose<B, B> T_successor_gone(Quat::Identity(), Vec3(1.1, 0, 0));
   flight_.hand_over(KeyframeId{2}, KeyframeId{1}, T_successor_gone);
   map_.remove(KeyframeId{2});
@@ -58,26 +58,26 @@ TEST_F(Anchors, PosesOfARemovedKeyframeFollowItsHeir) {
   EXPECT_NEAR(x_at(4), 2.7, 1e-12);
 }
 
-TEST_F(Anchors, WhatIsLostOrHasNoPlaceIsBridged) {
+TEST_F(KeyframesOfAFlight, WhatIsLostOrHasNoPlaceIsBridged) {
   flight_.drop(KeyframeId{1});
   map_.find(KeyframeId{2})->placed = false;
   EXPECT_NEAR(x_at(2), 2.0 / 3 * 1 + 1.0 / 3 * (3.3 - 2), 1e-12);  // between the keyframes at 0 and 3 s
 }
 
-TEST_F(Anchors, AFlightWithoutAPlaceInMIsEmpty) {
+TEST_F(KeyframesOfAFlight, AFlightWithoutAPlaceInMIsEmpty) {
   for (MapKeyframe& k : map_.keyframes()) k.placed = false;
   EXPECT_TRUE(corrected().empty());
   flight_ = {};
   EXPECT_TRUE(corrected().empty());
 }
 
-TEST(FlightAnchors, OfADayOlderKeyframesAreLeftOutAndTheFlightIsStillWhole) {
+TEST(FlightKeyframes, OfADayOlderKeyframesAreLeftOutAndTheFlightIsStillWhole) {
   constexpr int kKeyframes = 200'000;
   PlaceMap map;
   MapKeyframe only;
   only.t = Time{};
   const KeyframeId id = map.add(only);
-  FlightAnchors flight;
+  FlightKeyframes flight;
   Trajectory<G> in_G;
   for (int i = 0; i < kKeyframes; ++i) {
     const Time t = Time{} + Duration::from_seconds(0.5 * i);
@@ -89,5 +89,5 @@ TEST(FlightAnchors, OfADayOlderKeyframesAreLeftOutAndTheFlightIsStillWhole) {
   EXPECT_EQ(flight.corrected(map, in_G).size(), in_G.size());
 }
 
-}  // namespace flight_anchors_test
+}  // namespace flight_keyframes_test
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/loop/flight_anchors.hpp"
+#include "fbvins/loop/flight_keyframes.hpp"
 
 #include <algorithm>
 
@@ -11,7 +11,7 @@ constexpr std::size_t kMost = 32768;
 
 }  // namespace
 
-void FlightAnchors::add(Time t, KeyframeId id) {
+void FlightKeyframes::add(Time t, KeyframeId id) {
   entries_.push_back({t, id, {}});
   if (entries_.size() <= kMost) return;
   const auto begin = entries_.begin(), middle = begin + kMost / 2;
@@ -20,16 +20,16 @@ void FlightAnchors::add(Time t, KeyframeId id) {
   entries_.erase(kept, middle);
 }
 
-void FlightAnchors::hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone) {
+void FlightKeyframes::hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone) {
   for (Entry& e : entries_)
-    if (e.anchor == gone) e.anchor = successor, e.T_anchor_B = T_successor_gone * e.T_anchor_B;
+    if (e.kept == gone) e.kept = successor, e.T_kept_B = T_successor_gone * e.T_kept_B;
 }
 
-void FlightAnchors::drop(KeyframeId gone) {
-  std::erase_if(entries_, [&](const Entry& e) { return e.anchor == gone; });
+void FlightKeyframes::drop(KeyframeId gone) {
+  std::erase_if(entries_, [&](const Entry& e) { return e.kept == gone; });
 }
 
-Trajectory<M> FlightAnchors::corrected(const PlaceMap& map, const Trajectory<G>& in_G) const {
+Trajectory<M> FlightKeyframes::corrected(const PlaceMap& map, const Trajectory<G>& in_G) const {
   struct Knot {
     Time t;
     Pose<M, B> T_MB;
@@ -37,10 +37,10 @@ Trajectory<M> FlightAnchors::corrected(const PlaceMap& map, const Trajectory<G>&
   };
   std::vector<Knot> knots;
   for (const Entry& e : entries_) {
-    const MapKeyframe* anchor = map.find(e.anchor);
+    const MapKeyframe* kept = map.find(e.kept);
     const auto at = std::lower_bound(in_G.begin(), in_G.end(), e.t, [](const StampedPose<G>& p, Time t) { return p.t < t; });
-    if (anchor == nullptr || !anchor->placed || at == in_G.end() || at->t != e.t) continue;
-    knots.push_back({e.t, anchor->T_MB * e.T_anchor_B, at->T});
+    if (kept == nullptr || !kept->placed || at == in_G.end() || at->t != e.t) continue;
+    knots.push_back({e.t, kept->T_MB * e.T_kept_B, at->T});
   }
   Trajectory<M> out;
   if (knots.empty()) return out;
