@@ -12,7 +12,7 @@
 namespace fbvins {
 namespace component_test {
 
-constexpr double kSeconds = 4;
+constexpr double kSeconds = 3;
 const std::vector<std::string> kImages{"/left", "/right"};
 
 /// Rendered once.
@@ -20,6 +20,7 @@ const test::RenderedRecording& recorded() {
   static const test::RenderedRecording recorded = [] {
     SimulationOptions options = *simulation_preset("normal");
     options.flight.duration_s = kSeconds;
+    options.image_rate_hz = 10;
     return test::rendered(options);
   }();
   return recorded;
@@ -109,7 +110,7 @@ TEST_F(Ros2Component, FliesByItsTopics) {
   ASSERT_GT(odometry->size(), 100u) << "of " << recorded().events.size() << " readings and frames";
   const nav_msgs::msg::Odometry &start = odometry->front(), &end = odometry->back();
   EXPECT_EQ(end.header.frame_id, "odom");
-  EXPECT_EQ(end.child_frame_id, "imu");
+  EXPECT_EQ(end.child_frame_id, "imu_link");
   const auto place = [](const nav_msgs::msg::Odometry& o) {
     return Vec3(o.pose.pose.position.x, o.pose.pose.position.y, o.pose.pose.position.z);
   };
