@@ -126,7 +126,7 @@ TEST_F(Ros2Component, FliesByItsTopics) {
 }
 
 TEST_F(Ros2Component, AnswersResetAndNamesImagesThatDoNotFit) {
-  const KalibrFiles files(recorded().rig);
+  const KalibrFiles files(euroc_rig());
   const fbvins_ros2::FbvinsComponent component(parameters(files));
   rclcpp::StandInGraph& graph = rclcpp::StandInGraph::instance();
   using Reset = rclcpp::Service<std_srvs::srv::Trigger>::Call;
@@ -140,7 +140,7 @@ TEST_F(Ros2Component, AnswersResetAndNamesImagesThatDoNotFit) {
 }
 
 TEST_F(Ros2Component, RefusesParametersThatDoNotFit) {
-  const KalibrFiles files(recorded().rig);
+  const KalibrFiles files(euroc_rig());
   EXPECT_EQ(refusal(parameters(files), "calibration", std::string()),
             "the parameter 'calibration' names no Kalibr camchain-imucam.yaml");
   const std::string one = refusal(parameters(files), "images", std::vector<std::string>{"/left"});
