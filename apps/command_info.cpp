@@ -88,18 +88,20 @@ void print_text(const std::string& path, const BagSurvey& bag) {
   for (const TopicSurvey& t : bag.topics)
     fmt::print("{:<34}{:>8} messages{:>9.2f} Hz  {}{}{}\n", t.name, t.messages, t.rate_hz, t.type, t.first.empty() ? "" : "  ",
                t.first);
-  if (bag.cameras.empty()) return;
+  if (bag.cameras.empty() || !bag.unreadable.empty()) return;
   fmt::print("topics to use: cameras {}, IMU {}{}\n", fmt::join(bag.cameras, ", "), bag.imu,
              bag.depth.empty() ? "" : ", depth images " + bag.depth);
 }
 
 /// A bag is shown also where it cannot be run before a calibration or its topics are named; that is said, and is no failure here.
+/// Images that nothing can be done with are one.
 int show_bag(const Arguments& arguments, const BagSurvey& bag, const Error& why) {
   for (const std::string& warning : bag.warnings) warn(warning);
   if (arguments.json) fmt::print("{}\n", describe(bag).dump(2));
   else print_text(arguments.recording.path, bag);
   if (!arguments.recording.topics.empty() && !bag.question.empty()) return fail(why.message);
   if (bag.question.empty() && bag.no_calibration.empty()) return fail(why.message);
+  if (!bag.unreadable.empty()) return fail(fmt::format("{}: {}", arguments.recording.path, bag.unreadable));
   warn(why.message);
   return kOk;
 }

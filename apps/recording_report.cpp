@@ -94,11 +94,17 @@ Json describe(const BagSurvey& bag) {
   for (const TopicSurvey& t : bag.topics)
     topics.push_back({{"name", t.name}, {"type", t.type}, {"messages", t.messages}, {"rate_hz", t.rate_hz}, {"first", t.first}});
   const auto camera = [&](std::size_t i) { return i < bag.cameras.size() ? bag.cameras[i] : std::string(); };
-  return Json{{"format", bag.format},     {"duration_s", bag.duration_s},
-              {"topics", topics},         {"left", camera(0)},
-              {"right", camera(1)},       {"cameras", bag.cameras},
-              {"imu", bag.imu},           {"depth", bag.depth},
-              {"question", bag.question}, {"no_calibration", bag.no_calibration},
+  return Json{{"format", bag.format},
+              {"duration_s", bag.duration_s},
+              {"topics", topics},
+              {"left", camera(0)},
+              {"right", camera(1)},
+              {"cameras", bag.cameras},
+              {"imu", bag.imu},
+              {"depth", bag.depth},
+              {"question", bag.question},
+              {"unreadable", bag.unreadable},
+              {"no_calibration", bag.no_calibration},
               {"warnings", bag.warnings}};
 }
 

@@ -45,6 +45,7 @@ def check_what_cannot_be_run(program, folder, root):
     for command in (["info"], ["doctor"], ["run", "--out", root / "none"], ["convert", root / "none"]):
         refused([*command[:1], root / "tiff.bag", *command[1:], "--calibration", folder], sentence)
     assert not (root / "none").exists(), "a folder of results of nothing"
+    refused(["info", root / "tiff.bag"], "tiff.bag: /cam0/image_raw: images encoded as 'tiff' cannot be read")
     refused(["run", root / "lz4.bag"], "give one with --calibration")
 
     done = subprocess.run([program, "info", root / "lz4.bag"], check=False, capture_output=True, text=True)

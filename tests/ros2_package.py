@@ -121,7 +121,7 @@ def check_component(root):
     """What the launch file gives the component is what its source declares, and what it is built with is in package.xml."""
     source = (root / "ros2/src/fbvins_component.cpp").read_text(encoding="utf-8")
     known = set(re.findall(r'declare_parameter<[^(]*>\(\s*"(\w+)"', source))
-    require(len(known) == 6, f"parameters of the component: {known}")
+    require(len(known) == 7, f"parameters of the component: {known}")
     for given, where, images in (({}, "name", 2), ({"container": "/camera/container", "right": ""}, "target_container", 1)):
         loaded, = processes(root / "ros2/launch", "component.launch.py", {"calibration": "chain.yaml", **given})[0]
         node, = loaded["composable_node_descriptions"]

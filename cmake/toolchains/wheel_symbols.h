@@ -3,9 +3,15 @@
    and is in glibc 2.28, too. */
 #ifndef FBVINS_WHEEL_SYMBOLS_H
 #define FBVINS_WHEEL_SYMBOLS_H
-__asm__(".symver exp,exp@GLIBC_2.2.5");
-__asm__(".symver exp2,exp2@GLIBC_2.2.5");
-__asm__(".symver log,log@GLIBC_2.2.5");
-__asm__(".symver log2,log2@GLIBC_2.2.5");
-__asm__(".symver pow,pow@GLIBC_2.2.5");
+#ifdef __aarch64__
+#define FIRST "GLIBC_2.17"
+#else
+#define FIRST "GLIBC_2.2.5"
+#endif
+__asm__(".symver exp,exp@" FIRST);
+__asm__(".symver exp2,exp2@" FIRST);
+__asm__(".symver log,log@" FIRST);
+__asm__(".symver log2,log2@" FIRST);
+__asm__(".symver pow,pow@" FIRST);
+#undef FIRST
 #endif

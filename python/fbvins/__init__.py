@@ -139,7 +139,7 @@ def _opened(recording: Union[Recording, PathLike], calibration: Optional[PathLik
 def info(recording: Union[Recording, PathLike], *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
          topics: Tuple[str, ...] = ()) -> Dict[str, Any]:
     """What is in a recording, as `fbvins info --json` says it: rates, gaps, calibration, stamps, warnings. Of a bag that lacks a calibration, or
-    whose topics must be chosen: its topics with rates, and what is missing ("question", "no_calibration")."""
+    whose topics must be chosen: its topics with rates, and what is missing ("question", "unreadable", "no_calibration")."""
     try:
         return json.loads(_fbvins.info(_opened(recording, calibration, imu_calibration, topics)))
     except (ValueError, OSError):

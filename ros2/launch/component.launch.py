@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""FB-VINS as a component: in a container of its own, or in that of a driver, whose images it then gets without a copy.
+r"""
+FB-VINS as a component, in a container of its own or in that of a driver.
 
-ros2 launch fbvins_ros2 component.launch.py calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
-ros2 launch fbvins_ros2 component.launch.py container:=/camera/camera_container calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
+A driver's images then come without a copy.
+
+ros2 launch fbvins_ros2 component.launch.py \
+    calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
+ros2 launch fbvins_ros2 component.launch.py container:=/camera/camera_container \
+    calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
 """
+
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
@@ -12,7 +18,11 @@ from launch_ros.descriptions import ComposableNode
 
 ARGUMENTS = (
     ("left", "/camera/infra1/image_rect_raw", "sensor_msgs/Image of the left camera"),
-    ("right", "/camera/infra2/image_rect_raw", "sensor_msgs/Image of the right camera; empty: there is one camera"),
+    (
+        "right",
+        "/camera/infra2/image_rect_raw",
+        "sensor_msgs/Image of the right camera; empty: there is one camera",
+    ),
     ("imu", "/camera/imu", "sensor_msgs/Imu"),
     ("calibration", "", "Kalibr's camchain-imucam.yaml"),
     ("imu_calibration", "", "Kalibr's imu.yaml"),
@@ -26,17 +36,42 @@ def component(context):
         return LaunchConfiguration(name).perform(context)
 
     images = [value(name) for name in ("left", "right") if value(name)]
-    parameters = {"images": images, **{name: value(name) for name in ("imu", "calibration", "imu_calibration", "config")}}
-    node = ComposableNode(package="fbvins_ros2", plugin="fbvins_ros2::FbvinsComponent", name="fbvins", parameters=[parameters],
-                          extra_arguments=[{"use_intra_process_comms": True}])
+    parameters = {
+        "images": images,
+        **{name: value(name) for name in ("imu", "calibration", "imu_calibration", "config")},
+    }
+    node = ComposableNode(
+        package="fbvins_ros2",
+        plugin="fbvins_ros2::FbvinsComponent",
+        name="fbvins",
+        parameters=[parameters],
+        extra_arguments=[{"use_intra_process_comms": True}],
+    )
     if value("container"):
-        return [LoadComposableNodes(target_container=value("container"), composable_node_descriptions=[node])]
-    return [ComposableNodeContainer(name="fbvins_container", namespace="", package="rclcpp_components", executable="component_container_mt",
-                                    composable_node_descriptions=[node], output="screen")]
+        return [
+            LoadComposableNodes(
+                target_container=value("container"), composable_node_descriptions=[node]
+            )
+        ]
+    return [
+        ComposableNodeContainer(
+            name="fbvins_container",
+            namespace="",
+            package="rclcpp_components",
+            executable="component_container_mt",
+            composable_node_descriptions=[node],
+            output="screen",
+        )
+    ]
 
 
 def generate_launch_description():
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
-        OpaqueFunction(function=component),
-    ])
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, default, text in ARGUMENTS
+            ),
+            OpaqueFunction(function=component),
+        ]
+    )

@@ -1,11 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images and readings from topics: of a driver that runs elsewhere (an OAK, a ZED), or of a bag that is played here.
+r"""
+Images and readings from topics, of a driver that runs elsewhere or of a bag played here.
 
-ros2 launch fbvins_ros2 topics.launch.py left:=/oak/left/image_raw right:=/oak/right/image_raw imu:=/oak/imu/data calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
-ros2 launch fbvins_ros2 topics.launch.py bag:=flight left:=/cam0/image_raw right:=/cam1/image_raw imu:=/imu0 calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
+ros2 launch fbvins_ros2 topics.launch.py \
+    left:=/oak/left/image_raw right:=/oak/right/image_raw imu:=/oak/imu/data \
+    calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
+ros2 launch fbvins_ros2 topics.launch.py bag:=flight \
+    left:=/cam0/image_raw right:=/cam1/image_raw imu:=/imu0 \
+    calibration:=camchain-imucam.yaml imu_calibration:=imu.yaml
 """
+
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, OpaqueFunction, TimerAction
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    TimerAction,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 
@@ -23,7 +35,12 @@ def topics(context):
         return LaunchConfiguration(name).perform(context)
 
     source = "ros2:" + ",".join(value(name) for name in ("left", "right", "imu"))
-    actions = [IncludeLaunchDescription(PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/live.launch.py"]), launch_arguments={"source": source}.items())]
+    actions = [
+        IncludeLaunchDescription(
+            PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/live.launch.py"]),
+            launch_arguments={"source": source}.items(),
+        )
+    ]
     if value("bag"):
         player = ExecuteProcess(cmd=["ros2", "bag", "play", value("bag")], output="screen")
         actions.append(TimerAction(period=FIND_EACH_OTHER_S, actions=[player]))
@@ -31,7 +48,12 @@ def topics(context):
 
 
 def generate_launch_description():
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
-        OpaqueFunction(function=topics),
-    ])
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, default, text in ARGUMENTS
+            ),
+            OpaqueFunction(function=topics),
+        ]
+    )

@@ -18,6 +18,7 @@
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
 #include <fbvins/camera/camera_times.hpp>
 #include <fbvins/config/config_file.hpp>
+#include <fbvins/io/dataset.hpp>
 #include <fbvins/io/kalibr.hpp>
 #include <fbvins/live/frame_joiner.hpp>
 #include <fbvins/live/live_system.hpp>
@@ -208,15 +209,18 @@ class FbvinsComponent final : public rclcpp::Node {
     const auto imu_noise = declare_parameter<std::string>("imu_calibration", "");
     const auto file = declare_parameter<std::string>("config", "");
     const auto assignments = declare_parameter<std::vector<std::string>>("set", std::vector<std::string>{});
+    const auto tolerance_ms = declare_parameter<double>("pair_tolerance_ms", fbvins::DatasetOptions{}.pair_tolerance_ms);
     if (chain.empty()) throw std::invalid_argument("the parameter 'calibration' names no Kalibr camchain-imucam.yaml");
     const fbvins::Config config = checked(fbvins::load_config(file, assignments));
     rig_ = checked(fbvins::load_kalibr(chain, imu_noise.empty() ? std::nullopt : std::optional(imu_noise)));
     if (static_cast<int>(images.size()) != rig_.camera_count())
       throw std::invalid_argument("'images' has " + std::to_string(images.size()) + " topics, and " + chain + " " +
                                   std::to_string(rig_.camera_count()) + " cameras");
+    if (!(tolerance_ms >= 0 && tolerance_ms <= 1000))
+      throw std::invalid_argument("'pair_tolerance_ms' is " + std::to_string(tolerance_ms) + ", and not from 0 to 1000");
     live_.emplace(checked(fbvins::LiveSystem::create(config, config.live, rig_)));
     live_->add_sink(std::make_unique<Output>(*this, rig_, config));
-    joiner_.emplace(rig_.camera_count(), false, fbvins::own_offsets(rig_));
+    joiner_.emplace(rig_.camera_count(), false, fbvins::Duration::from_seconds(1e-3 * tolerance_ms), fbvins::own_offsets(rig_));
     for (std::size_t c = 0; c < images.size(); ++c)
       images_.push_back(create_subscription<sensor_msgs::msg::Image>(
           images[c], rclcpp::SensorDataQoS(),

@@ -20,8 +20,8 @@ double rate_of(std::vector<Time> stamps) {
   return measure_intervals(stamps).rate_hz;
 }
 
-/// What the first message of a topic tells about all of them.
-std::string first_of(const BagMessage& message, const BagTopic& about) {
+/// What the first message of a topic tells about all of them. `unreadable`: the error, where all have it.
+std::string first_of(const BagMessage& message, const BagTopic& about, std::string& unreadable) {
   if (about.type == "sensor_msgs/Imu") {
     MessageFields in(message.data, about.encoding);
     in.header();
@@ -31,7 +31,10 @@ std::string first_of(const BagMessage& message, const BagTopic& about) {
   const bool compressed = about.type == "sensor_msgs/CompressedImage";
   const Result<Image> image = image_of(message.data, about.encoding, compressed);
   const std::string kind = compressed ? "compressed" : encoding_of(message.data, about.encoding);
-  return image ? fmt::format("{} x {} {}", image->width(), image->height(), kind) : image.error().message;
+  if (image) return fmt::format("{} x {} {}", image->width(), image->height(), kind);
+  if (image.error().code == ErrorCode::unsupported)
+    unreadable = image.error().message;  // an encoding; else it may be one that is damaged
+  return image.error().message;
 }
 
 }  // namespace
@@ -41,10 +44,12 @@ BagSurvey survey_bag(BagReader& bag, const RecordingOptions& options) {
   out.format = bag.format();
   std::map<std::string, std::vector<Time>> stamps;
   std::map<std::string, TopicSurvey> topics;
+  std::map<std::string, std::string> unreadable;
   const BagContents contents = read_contents(bag, [&](const BagMessage& message, const BagTopic& about) {
     TopicSurvey& topic = topics[about.name];
     if (topic.messages++ == 0)
-      topic.name = printable(about.name), topic.type = printable(about.type), topic.first = first_of(message, about);
+      topic.name = printable(about.name), topic.type = printable(about.type),
+      topic.first = first_of(message, about, unreadable[about.name]);
     stamps[about.name].push_back(message.log_time);
   });
   Time first{std::int64_t{1} << 62}, last{0};
@@ -65,7 +70,11 @@ BagSurvey survey_bag(BagReader& bag, const RecordingOptions& options) {
   }
   const bool has_own = own_rig(contents, *chosen).has_value();
   if (options.topics.empty() && options.calibration.empty() && !has_own) chosen->cameras = calibrated_cameras(contents, *chosen);
-  for (const std::string& topic : chosen->cameras) out.cameras.push_back(printable(topic));
+  for (const std::string& topic : chosen->cameras) {
+    out.cameras.push_back(printable(topic));
+    if (out.unreadable.empty() && !unreadable[topic].empty())
+      out.unreadable = fmt::format("{}: {}", printable(topic), unreadable[topic]);
+  }
   out.imu = printable(chosen->imu), out.depth = printable(chosen->depth);
   if (!options.calibration.empty() || has_own) return out;
   if (const auto rig = rig_of(contents, *chosen); !rig) out.no_calibration = rig.error().message;

@@ -28,6 +28,7 @@ struct BagSurvey {
   std::vector<std::string> cameras;  ///< topics that would be used; empty: `question` says why
   std::string imu, depth;            ///< likewise; no depth images: empty
   std::string question;              ///< "has two pairs of ...: say which with --topics"; empty: none
+  std::string unreadable;            ///< why images of these cameras cannot be read, all being of one encoding; empty: they can
   std::string no_calibration;        ///< why the bag's own calibration is none; empty: it has one, or one is given
   std::vector<std::string> warnings;
 };

@@ -279,6 +279,7 @@ TEST(BagSurvey, SaysWhatIsThereWithoutACalibration) {
   EXPECT_EQ(survey.cameras, (std::vector<std::string>{"/left", "/right"}));
   EXPECT_EQ(survey.imu + survey.depth, "/imu");
   EXPECT_EQ(survey.question, "");
+  EXPECT_EQ(survey.unreadable, "/left: images encoded as 'bad?red' cannot be read");
   EXPECT_EQ(survey.no_calibration, "holds no calibration (no camera_info for /left): give one with --calibration");
 }
 

@@ -19,19 +19,20 @@ class KalibrFiles {
     folder_ = std::filesystem::temp_directory_path() / fmt::format("fbvins_kalibr_{}_{}", ::getpid(), ++made);
     std::filesystem::create_directories(folder_);
     std::ofstream chain(camchain());
-    const auto camera = [&](const std::string& name, const Camera& c, const Mat3& R_CB, const Vec3& p_CB) {
+    const auto camera = [&](const std::string& name, const Camera& c, const CameraTimes& times, const Mat3& R_CB,
+                            const Vec3& p_CB) {
       const auto& k = std::get<PinholeRadtan>(c.model());
       chain << name << ":\n  camera_model: pinhole\n  distortion_model: radtan\n"
             << fmt::format("  intrinsics: [{}, {}, {}, {}]\n  distortion_coeffs: [{}, {}, {}, {}]\n", k.fx, k.fy, k.cx, k.cy,
                            k.k1, k.k2, k.p1, k.p2)
             << fmt::format("  resolution: [{}, {}]\n  timeshift_cam_imu: {}\n  rostopic: /{}/image\n  T_cam_imu:\n", c.width(),
-                           c.height(), rig.time_offset_s, name);
+                           c.height(), times.time_offset_s, name);
       for (int i = 0; i < 3; ++i) chain << fmt::format("  - [{}, {}, {}, {}]\n", R_CB(i, 0), R_CB(i, 1), R_CB(i, 2), p_CB(i));
       chain << "  - [0.0, 0.0, 0.0, 1.0]\n";
     };
     for (int i = 0; i < rig.camera_count(); ++i) {
       const auto T_CB = rig.T_BC(i).inverse();
-      camera(fmt::format("cam{}", i), rig.camera(i), T_CB.R(), T_CB.p);
+      camera(fmt::format("cam{}", i), rig.camera(i), rig.times(i), T_CB.R(), T_CB.p);
     }
     const ImuNoise& n = rig.imu_noise;
     std::ofstream(imu()) << fmt::format(

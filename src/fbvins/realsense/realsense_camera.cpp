@@ -175,11 +175,11 @@ DeviceFacts RealsenseCamera::facts() {
   return facts;
 }
 
-Result<void> RealsenseCamera::start(SensorInput& input) {
+Result<void> RealsenseCamera::start(SensorInput& input, FrameJoiner pairs) {
   {
     const std::lock_guard lock(mutex_);
     heard_ = host_now();
-    pairs_ = FrameJoiner(2, false, wanted_.pair_tolerance),
+    pairs_ = std::move(pairs);
     motion_ = MotionMerge();  // what it had before it stopped is of no use
   }
   try {

@@ -30,7 +30,6 @@ Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2
 /// Size and rate of the images that are wanted; 0: whatever is nearest to 640 x 480 at 30 Hz.
 struct RealsenseMode {
   int width_px = 0, height_px = 0, rate_hz = 0;
-  Duration pair_tolerance{3'000'000};
 };
 
 /// What images say of themselves, where driver and firmware pass it on.
@@ -60,8 +59,8 @@ class RealsenseCamera {
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }
   const rs2::device& device() const { return device_; }
-  /// Delivers on the library's threads until stop().
-  Result<void> start(SensorInput& input);
+  /// Delivers on the library's threads until stop(), with the images that `pairs` joins.
+  Result<void> start(SensorInput& input, FrameJoiner pairs = FrameJoiner(2));
   void stop();
   /// Since its start or its last image, on this machine's clock.
   Duration silence();

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/live/host_clock.hpp"
 
@@ -57,7 +58,6 @@ Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(rs2::context cont
   const RealsenseName name = parse_realsense_name(which);
   std::unique_ptr<RealsenseSource> source(new RealsenseSource(std::move(context), name.which, options));
   source->mode_ = name.mode;
-  source->mode_.pair_tolerance = Duration::from_seconds(1e-3 * options.dataset.pair_tolerance_ms);
   if (Result<void> watched = source->watch(); !watched) return watched.error();
   if (Result<void> found = source->wait_for_first(); !found) return found.error();
   if (Result<void> known = source->set_rig(); !known) return known.error();
@@ -172,7 +172,7 @@ Result<void> RealsenseSource::run(SensorInput& input) {
     }
     const std::string name = realsense_name(camera_->device());
     ++cameras_;
-    if (Result<void> started = camera_->start(input); !started) {
+    if (Result<void> started = start_camera(input); !started) {
       report(started.error().message);
     } else {
       problem_.clear();
@@ -193,6 +193,11 @@ Result<void> RealsenseSource::run(SensorInput& input) {
   return {};
 }
 
+Result<void> RealsenseSource::start_camera(SensorInput& input) {
+  const auto tolerance = Duration::from_seconds(1e-3 * options_.dataset.pair_tolerance_ms);
+  return camera_->start(input, FrameJoiner(2, false, tolerance, own_offsets(rig_)));
+}
+
 /// Starts the streams again that have stopped though the camera is there.
 void RealsenseSource::mend_stall(SensorInput& input) {
   if (camera_->silence() < kStall) return;
@@ -202,7 +207,7 @@ void RealsenseSource::mend_stall(SensorInput& input) {
   stalled_ = host_now();
   camera_->stop();
   try {
-    if (Result<void> started = again ? Result<void>{} : camera_->start(input); !started) report(started.error().message);
+    if (Result<void> started = again ? Result<void>{} : start_camera(input); !started) report(started.error().message);
     if (!again) return;
     rs2::device(camera_->device()).hardware_reset();
   } catch (const rs2::error& e) {

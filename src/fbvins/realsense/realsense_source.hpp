@@ -49,6 +49,7 @@ class RealsenseSource final : public Source {
   void wait(double longest_s);
   void report(const std::string& problem);
   void mend_stall(SensorInput& input);
+  Result<void> start_camera(SensorInput& input);
   void keep_facts();
 
   SourceOptions options_;

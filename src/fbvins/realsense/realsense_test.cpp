@@ -10,6 +10,7 @@
 #include <mutex>
 #include <thread>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/io/kalibr_test_files.hpp"
 #include "fbvins/live/collected_input.hpp"
@@ -34,14 +35,15 @@ StereoRig rig() {
   return rig;
 }
 
-/// Plays camera and IMU for this many images, whose grey values are their numbers.
-void play(SoftwareCamera& camera, int images, Time start = kStart) {
+/// Plays camera and IMU for this many images, whose grey values are their numbers; right ones have later stamps by `right_late`.
+void play(SoftwareCamera& camera, int images, Time start = kStart, Duration right_late = {}) {
   for (int ms = 0; ms < images * 33; ++ms) {
     const Time t = start + Duration{ms * kMs};
     if (ms % 5 == 0) camera.gyro(t, Vec3(0.1, 0, 0.001 * ms));
     if (ms % 4 == 0) camera.accel(t, Vec3(0, -9.8, 0.01 * ms));
     if (ms % 33 == 0)
-      for (int side : {0, 1}) camera.image(side, t, Image(640, 480, static_cast<std::uint8_t>(2 * (ms / 33) + side)));
+      for (int side : {0, 1})
+        camera.image(side, side == 0 ? t : t + right_late, Image(640, 480, static_cast<std::uint8_t>(2 * (ms / 33) + side)));
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }
@@ -55,7 +57,7 @@ SourceOptions calibrated_by(const KalibrFiles& files) {
 }
 
 /// A recording of the library's own, made by its recorder.
-std::string record(const std::string& name, int images, std::chrono::milliseconds pause = {}) {
+std::string record(const std::string& name, int images, std::chrono::milliseconds pause = {}, Duration right_late = {}) {
   const std::string path = (std::filesystem::temp_directory_path() / name).string();
   std::filesystem::remove(path);
   SoftwareCamera camera(rig());
@@ -64,7 +66,7 @@ std::string record(const std::string& name, int images, std::chrono::millisecond
   auto recorded = RealsenseCamera::open(recorder, [](const std::string&) {});
   EXPECT_TRUE(recorded) << recorded.error().message;
   EXPECT_TRUE((*recorded)->start(collected));
-  play(camera, images);
+  play(camera, images, kStart, right_late);
   if (pause.count() > 0) {
     std::this_thread::sleep_for(pause);
     play(camera, images, kStart + Duration{images * 33 * kMs} + Duration{pause.count() * kMs});
@@ -245,6 +247,33 @@ TEST(Realsense, PlaysARecordingToItsEnd) {
   ASSERT_TRUE((*source)->run(got));
   EXPECT_GE(got.frames.size(), 28u);
   EXPECT_GT(got.readings.size(), 180u);
+  std::filesystem::remove(path);
+}
+
+/// By when they were taken, and not by their stamps; offsets are of the stamps.
+TEST(Realsense, JoinsImagesByTheCamerasOwnTimeOffsets) {
+  constexpr Duration kLate{12 * kMs};
+  const std::string path = record("fbvins_realsense_late.bag", 8, {}, kLate);  // fewer than show that there is no common trigger
+  const auto played = [&](const StereoRig& calibrated, std::string& said) {
+    const KalibrFiles files(calibrated);
+    SourceOptions options = calibrated_by(files);
+    options.say = [&](const std::string& s) { said += s; };
+    auto source = RealsenseSource::open(path, options);
+    EXPECT_TRUE(source) << source.error().message;
+    CollectedInput got;
+    EXPECT_TRUE((*source)->run(got));
+    return got.frames;
+  };
+  std::string said;
+  const auto frames = played(with_times(rig(), {{}, {.time_offset_s = -kLate.seconds()}}), said);
+  EXPECT_GE(std::count_if(frames.begin(), frames.end(), [](const StereoFrame& f) { return f.left && f.right; }), 6);
+  for (const StereoFrame& frame : frames)
+    if (frame.left && frame.right) {
+      EXPECT_EQ(frame.offsets, ExposureOffsets({{}, kLate}));
+    }
+  said.clear();
+  for (const StereoFrame& frame : played(rig(), said)) EXPECT_FALSE(frame.left && frame.right) << "12 ms are no pair";
+  EXPECT_NE(said.find("without partner within 3 ms"), std::string::npos) << said;
   std::filesystem::remove(path);
 }
 
