@@ -55,8 +55,8 @@ class YamlReader {
   /// Complains about every field of another name.
   void only(const YAML::Node& map, std::initializer_list<const char*> known);
 
-  /// "file:line: field: sentence": the line of the field, or, where it is missing, of the map that lacks it, unless that is all of
-  /// the file. Only the first one counts.
+  /// "file:line: field: sentence": the line of the field, or, where it is missing, of the map that lacks it, unless that is all
+  /// of the file. Only the first one counts.
   void complain(const YAML::Node& map, const std::string& field, const std::string& sentence);
   /// "file:line: sentence".
   void complain(const YAML::Mark& mark, const std::string& sentence);
