@@ -267,10 +267,7 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
   if (excess < 0 && !drifting) {
-    evidence_ = std::max(0.0, evidence_ + excess);
-    unexplained_s_ = std::max(0.0, unexplained_s_ - dt.seconds());
-    unexplained_ = unexplained_ && unexplained_s_ > 0;
-    pass(dt);
+    take_agreement(excess, dt);
     return out;
   }
   const PoseRefinement seen = refine_pose(sightings, calibration, predicted, v_B);
@@ -288,9 +285,7 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   const bool explained = seen.inliers >= kAgreeing * static_cast<double>(sightings.size()) &&
                          (excess < 0 || at_seen.worst() < kBetter * at_prediction.worst());
   if (!explained && !wrong) {
-    unexplained_s_ = std::min(kCalm_s, unexplained_s_ + dt.seconds());
-    unexplained_ = unexplained_ || unexplained_s_ > kDark_s;
-    blind(dt);
+    take_unexplained(dt);
     return out;
   }
   evidence_ = std::min(kMost, std::max(evidence_ + excess, drifting ? kContradiction : 0.0));
@@ -299,28 +294,48 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     return out;
   }
   if (wrong) {
-    excluded_s_ = excess < 0 ? excluded_s_ + dt.seconds() : 0;
-    if (excluded_s_ > kReadmitted_s) {
-      excluded_s_ = evidence_ = lasting_s_ = 0;
-      drift_ = none();
-      pass(dt);
-      return out;
-    }
-    out.wrong = wrong;
+    if (exclude(excess < 0, dt)) out.wrong = wrong;
     pass(dt);  // the readings agree with the others
     return out;
   }
-  const Vec3 turn = so3_log((predicted.q.conjugate() * seen.T_GB.q).normalized());
-  const Vec3 shift = seen.T_GB.p - predicted.p;
+  follow(seen.T_GB, predicted, dt, out);
+  return out;
+}
+
+void Monitor::take_agreement(double excess, Duration dt) {
+  evidence_ = std::max(0.0, evidence_ + excess);
+  unexplained_s_ = std::max(0.0, unexplained_s_ - dt.seconds());
+  unexplained_ = unexplained_ && unexplained_s_ > 0;
+  pass(dt);
+}
+
+void Monitor::take_unexplained(Duration dt) {
+  unexplained_s_ = std::min(kCalm_s, unexplained_s_ + dt.seconds());
+  unexplained_ = unexplained_ || unexplained_s_ > kDark_s;
+  blind(dt);
+}
+
+/// Whether a camera that is off is left out of this image.
+bool Monitor::exclude(bool for_drift_alone, Duration dt) {
+  excluded_s_ = for_drift_alone ? excluded_s_ + dt.seconds() : 0;
+  if (excluded_s_ <= kReadmitted_s) return true;
+  excluded_s_ = evidence_ = lasting_s_ = 0;
+  drift_ = none();
+  return false;
+}
+
+/// The images are believed, and the readings count as much as they agree.
+void Monitor::follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Duration dt, Verdict& out) {
+  const Vec3 turn = so3_log((predicted.q.conjugate() * seen.q).normalized());
+  const Vec3 shift = seen.p - predicted.p;
   out.imu_contradicts = true;
-  out.seen = seen.T_GB;
+  out.seen = seen;
   out.noise.gyro = std::max(out.noise.gyro, turn.norm() / (assumed_.gyro_noise_density_radps_rthz * std::sqrt(dt.seconds())));
   out.noise.accel =
       std::max(1.0, shift.norm() / (assumed_.accel_noise_density_mps2_rthz * std::sqrt(std::pow(dt.seconds(), 3) / 3)));
   take_doubt(predicted, turn, shift);
   contradicted_ = true;
   calm_s_ = blind_s_ = 0;
-  return out;
 }
 
 void Monitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G) {

@@ -74,6 +74,10 @@ class Monitor {
 
  private:
   void blind(Duration dt);
+  void take_agreement(double excess, Duration dt);
+  void take_unexplained(Duration dt);
+  bool exclude(bool for_drift_alone, Duration dt);
+  void follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Duration dt, Verdict& out);
   using OfEachCamera = std::array<Vec2, kMostCameras>;
   void add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt);
   double largest_drift() const;
