@@ -94,8 +94,8 @@ HeldOutPart judged(const Division& division, const FlightRig& given, const Fligh
   const FlightLesson lesson = learn_from(division.others, given, division.survey, question);
   HeldOutPart out{division.name, lesson.changed};
   if (!lesson.changed) return out;
-  out.given = settled_cost(division.held_out, given, lesson.noise.sigma_px);
-  out.refined = settled_cost(division.held_out, as_flown(lesson.rig), lesson.noise.sigma_px);
+  out.given = settled_cost(division.held_out, given, lesson.noise);
+  out.refined = settled_cost(division.held_out, as_flown(lesson.rig), lesson.noise);
   out.gain = (out.given - out.refined) / lesson.noise.spread;
   return out;
 }

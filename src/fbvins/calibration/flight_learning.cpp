@@ -118,10 +118,11 @@ class Choice {
 FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given) {
   FlightSurvey out;
   const std::vector<bool> all(static_cast<std::size_t>(values(given).size()), true);
-  (void)settled_cost(pieces, given, out.noise.sigma_px);
+  (void)settled_cost(pieces, given, out.noise);
   out.noise.sigma_px = sigma_px_of(pieces, given);
   out.fit = fit_calibration(pieces, given, given, all, out.noise);
   out.noise.sigma_px = sigma_px_of(pieces, out.fit.rig);
+  out.noise = with_noise_of_readings(pieces, out.fit.rig, out.noise);
   out.fit = fit_calibration(pieces, given, out.fit.rig, all, out.noise);
   out.noise.spread = spread_of(pieces, out.fit, out.noise);
   return out;
