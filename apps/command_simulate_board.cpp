@@ -61,8 +61,11 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->footer(kExamples);
   command->add_option("--out", a->out, "folder for the recording")->required();
   command->add_option("--target", a->target, "the board; left out: AprilGrid, 6 x 6 tags of 88 mm");
-  command->add_option("--lens", a->options.lens, "lens model of both cameras")
+  command->add_option("--lens", a->options.lens, "lens model of all cameras")
       ->check(CLI::IsMember(lens_names()))
+      ->capture_default_str();
+  command->add_option("--cameras", a->options.cameras, "how many: the pair, and one to each side of it")
+      ->check(CLI::Range(1, 4))
       ->capture_default_str();
   command->add_option("--seconds", a->options.seconds, "length")->check(CLI::Range(1.0, 3600.0))->capture_default_str();
   command->add_option("--rate", a->options.image_rate_hz, "images a second")

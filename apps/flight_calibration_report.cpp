@@ -76,6 +76,7 @@ std::string flight_calibration_json(const FlightCalibration& found, const std::v
   out["duration_s"] = found.duration_s, out["pieces"] = found.pieces, out["keyframes"] = found.keyframes;
   out["points"] = found.points, out["views"] = found.views;
   out["noise_px"] = found.sigma_px, out["spread"] = found.spread;
+  out["gyro_noise"] = found.gyro_noise_radps_rthz, out["accel_noise"] = found.accel_noise_mps2_rthz;
   out["parameters"] = Json::object();
   for (const RefinedParameter& p : found.parameters)
     out["parameters"][p.name] = {{"given", p.given},

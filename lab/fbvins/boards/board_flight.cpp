@@ -69,6 +69,15 @@ Result<BoardPattern> pattern_of(const BoardFlightOptions& options) {
   return pattern;
 }
 
+/// Number k, 2 or 3: beside the pair, turned outwards; in `cameras` and `T_CnC0` the second.
+SimulatedRig further_camera(const Camera& left, int k) {
+  std::vector<double> own = lens_parameters(left.model());
+  own[0] *= 1 - 0.003 * k, own[1] *= 1 - 0.003 * k, own[2] -= 3 * k, own[3] += 2 * k;
+  const double side = k % 2 == 0 ? 1 : -1;
+  return {{left, Camera(with_parameters(left.model(), own.data()), left.width(), left.height())},
+          {{}, {so3_exp(Vec3(0.01, -0.1 * side, 0.02)), Vec3(0.055 + 0.11 * side, 0.06, 0.01)}}};
+}
+
 Result<void> write_whole(const std::string& path, const std::string& text) {
   Result<OutputFile> file = OutputFile::create(path);
   if (!file) return file.error();
@@ -79,6 +88,8 @@ Result<void> write_whole(const std::string& path, const std::string& text) {
 }  // namespace
 
 Result<StereoRig> board_flight_rig(const BoardFlightOptions& options) {
+  if (options.cameras < 1 || options.cameras > 4)
+    return Error{ErrorCode::invalid_argument, "a board is simulated for 1 to 4 cameras"};
   for (const Camera& left : example_cameras()) {
     if (left.model_name() != options.lens) continue;
     const SimulatedRig cameras = simulated_stereo(left);
@@ -88,7 +99,12 @@ Result<StereoRig> board_flight_rig(const BoardFlightOptions& options) {
     Mat3 R_BC;
     R_BC << 0, -1, 0, 1, 0, 0, 0, 0, 1;
     rig.T_BC0 = {Quat(R_BC) * so3_exp(Vec3(0.02, -0.03, 0.015)), Vec3(-0.0216, -0.0647, 0.0098)};
-    rig.T_BC1 = rig.T_BC0 * cameras.T_CnC0[1].inverse().cast_frames<C0, C1>();
+    std::vector<MountedCamera> mounted{{left, rig.T_BC0}};
+    for (int k = 1; k < options.cameras; ++k) {
+      const SimulatedRig one = k == 1 ? cameras : further_camera(left, k);
+      mounted.push_back({one.cameras[1], rig.T_BC0 * one.T_CnC0[1].inverse().cast_frames<C0, C0>()});
+    }
+    rig = with_cameras(std::move(rig), mounted);
     rig.image_rate_hz = options.image_rate_hz;
     rig.time_offset_s = 1e-3 * options.time_offset_ms;
     return rig;
@@ -109,8 +125,8 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
   const SplineTrajectory hand = hand_before_board(options.board, rig->left.focal_px() / rig->left.width(), rig->T_BC0,
                                                   options.seconds + 1, seed, options.motion);
   const Pose<W, T> T_WT = hanging_board(options.board);
-  const BoardCamera cameras[2] = {{rig->left, *pattern, room}, {rig->right, *pattern, room}};
-  const Pose<B, Cn> T_BC[2] = {rig->T_BC0.cast_frames<B, Cn>(), rig->T_BC1.cast_frames<B, Cn>()};
+  std::vector<BoardCamera> cameras;
+  for (int k = 0; k < rig->camera_count(); ++k) cameras.emplace_back(rig->camera(k), *pattern, room);
   const double exposure_s = 1e-3 * options.exposure_ms;
   const int count = static_cast<int>(options.seconds * options.image_rate_hz);
   for (int i = 0; i < count; ++i) {
@@ -118,13 +134,20 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
     const double light = 1 + 0.15 * std::sin(0.7 * middle_s);
     const BoardImageOptions look{25 * light, 205 * light, options.blur_px, options.noise};
     const auto take = [&](int k) {
-      Rng rng(seed, static_cast<std::uint64_t>(2 * i + k + 1));
-      return std::make_shared<const Image>(cameras[k].render(poses(hand, T_WT, T_BC[k], middle_s, exposure_s), look, rng));
+      Rng rng(seed, k < 2 ? static_cast<std::uint64_t>(2 * i + k + 1)
+                          : static_cast<std::uint64_t>(k) << 32 | static_cast<std::uint64_t>(i));
+      const Pose<B, Cn> T_BC = rig->T_BC(k).cast_frames<B, Cn>();
+      return std::make_shared<const Image>(
+          cameras[static_cast<std::size_t>(k)].render(poses(hand, T_WT, T_BC, middle_s, exposure_s), look, rng));
     };
-    std::future<std::shared_ptr<const Image>> right = std::async(std::launch::async, take, 1);
+    std::vector<std::future<std::shared_ptr<const Image>>> others;
+    for (int k = 1; k < rig->camera_count(); ++k) others.push_back(std::async(std::launch::async, take, k));
     const Time stamp{kStart_ns + std::llround(1e9 * (middle_s - rig->time_offset_s))};
     StereoFrame frame{stamp, take(0), nullptr};
-    frame.right = right.get();
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      if (k == 0) frame.right = others[k].get();
+      else frame.more.push_back(others[k].get());
+    }
     if (Result<void> done = recording->add(std::move(frame), stamp); !done) return done;
     if (progress) progress(i + 1, count);
   }

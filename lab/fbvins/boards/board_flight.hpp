@@ -19,6 +19,7 @@ namespace fbvins {
 struct BoardFlightOptions {
   Board board;
   std::string lens = "pinhole-radtan";  ///< as Camera::model_name() names it
+  int cameras = 2;                      ///< 1 to 4, of slightly different numbers; the first two are the pair
   double seconds = 60;
   double image_rate_hz = 20;
   double exposure_ms = 2;     ///< blurs by motion

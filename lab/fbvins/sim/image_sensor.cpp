@@ -54,9 +54,11 @@ ImageSensor::ImageSensor(const CameraModelOptions& options, const Camera& camera
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
       // 1 on the axis, 1 - vignetting at 45 degrees; a lens that sees backwards is built to be as bright towards its edge.
-      const double r2 = wide ? 0 : camera.undistort(Vec2(x, y)).value_or(Vec2::Zero()).squaredNorm();
-      falloff_[static_cast<std::size_t>(y) * width_ + x] =
-          static_cast<float>(1 / (1 + r2 * options.vignetting / (1 - options.vignetting)));
+      const auto ray = camera.undistort(Vec2(x, y));  // none at 90 degrees and more, where this is 0
+      const double lost = options.vignetting / (1 - options.vignetting);
+      falloff_[static_cast<std::size_t>(y) * width_ + x] = static_cast<float>(wide || lost == 0 ? 1
+                                                                              : ray ? 1 / (1 + ray->squaredNorm() * lost)
+                                                                                    : 0);
     }
   // The exposure is that of what a lens shows, not of the black around its circle.
   lit_pixels_ = static_cast<double>(falloff_.size()) * (wide && camera.mask() ? 1 - camera.mask()->hidden_share() : 1);

@@ -25,7 +25,7 @@ constexpr int kFewestKeyframes = 5, kFewestPoints = 20;
 /// Pieces of all flights together, and of each at least, that bound the work.
 constexpr std::size_t kMostPieces = 40, kFewestOfEach = 4;
 /// By how much all held-out parts together must be predicted better, in units of half a squared standard deviation; and by how
-/// much any of them may be predicted worse, which is chance.
+/// much any of them may be predicted worse, which is chance. What is known to be rough need not be predicted so much better.
 constexpr double kLeastGain = 3;
 
 struct OwnedPiece {
@@ -94,8 +94,8 @@ HeldOutPart judged(const Division& division, const FlightRig& given, const Fligh
   const FlightLesson lesson = learn_from(division.others, given, division.survey, question);
   HeldOutPart out{division.name, lesson.changed};
   if (!lesson.changed) return out;
-  out.given = settled_cost(division.held_out, given, lesson.noise.sigma_px);
-  out.refined = settled_cost(division.held_out, as_flown(lesson.rig), lesson.noise.sigma_px);
+  out.given = settled_cost(division.held_out, given, lesson.noise);
+  out.refined = settled_cost(division.held_out, as_flown(lesson.rig), lesson.noise);
   out.gain = (out.given - out.refined) / lesson.noise.spread;
   return out;
 }
@@ -121,7 +121,7 @@ double total_gain(const FlightCalibration& found) {
 }
 
 /// Why the calibration stays as given; empty where it does not.
-std::string objection_to(const FlightCalibration& found, bool changed) {
+std::string objection_to(const FlightCalibration& found, bool changed, double least_gain) {
   const bool determined = std::any_of(found.parameters.begin(), found.parameters.end(), [](const RefinedParameter& p) {
     return p.flown && p.finding != FlightFinding::not_determined;
   });
@@ -131,7 +131,7 @@ std::string objection_to(const FlightCalibration& found, bool changed) {
     if (part.gain < -kLeastGain)
       return fmt::format("{} is predicted worse by the calibration refined without it than by the one given, which stays",
                          part.name);
-  if (total_gain(found) < kLeastGain)
+  if (total_gain(found) < least_gain)
     return "what was held out is hardly predicted better by the refined calibration than by the one given, which stays";
   return {};
 }
@@ -192,7 +192,8 @@ FlightCalibration counted(const std::vector<OwnedPiece>& pieces, const StereoRig
 std::vector<FlightQuestion> questions(const std::vector<FlightGroup>& rough) {
   using enum FlightGroup;
   const auto may_change = [&](FlightGroup group) { return rough.empty() || std::ranges::find(rough, group) != rough.end(); };
-  FlightQuestion question{{}, rough.empty() ? FlightQuestion{}.matters : 0};
+  FlightQuestion question;
+  question.rough = !rough.empty();
   for (const FlightGroup group : {lever, mounting, time_offset, baseline, between_cameras, focal, centre, distortion})
     if (!may_change(group)) question.left.push_back(group);
   std::vector<FlightQuestion> out{question};
@@ -211,7 +212,7 @@ FlightCalibration refined(const Division& all, const std::vector<Division>& divi
   const FlightLesson lesson = learn_from(all.others, given, all.survey, question);
   out.axes = lesson.rig.axes;
   fill_parameters(lesson, given, out);
-  out.verdict = objection_to(out, lesson.changed);
+  out.verdict = objection_to(out, lesson.changed, question.rough ? 0 : kLeastGain);
   out.better = out.verdict.empty();
   if (!out.better)
     for (RefinedParameter& p : out.parameters) p.value = p.flown ? p.given : p.value;
@@ -245,6 +246,8 @@ Result<FlightCalibration> calibrate_from_flights(const std::vector<FlightTracks>
   for (const FlightQuestion& question : questions(options.rough)) {
     tell(best ? "judging with less of the lenses refined" : "judging");
     FlightCalibration found = refined(all, divisions, given, question, counted(pieces, rig, all.survey.noise));
+    found.gyro_noise_radps_rthz = all.survey.noise.gyro * flights.front().noise.gyro_noise_density_radps_rthz;
+    found.accel_noise_mps2_rthz = all.survey.noise.accel * flights.front().noise.accel_noise_density_mps2_rthz;
     const bool unchanged = std::none_of(found.held_out.begin(), found.held_out.end(), [](const auto& p) { return p.changed; });
     if (!best || (found.better && (!best->better || total_gain(found) > total_gain(*best)))) best = std::move(found);
     if (unchanged) break;

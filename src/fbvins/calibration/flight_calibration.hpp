@@ -21,7 +21,8 @@ namespace fbvins {
 
 struct FlightCalibrationOptions {
   std::function<void(const std::string&)> on_progress = {};  ///< a few words
-  /// If any: these alone are refined, and changes of them matter however small they are; they are known to be rough.
+  /// If any: these alone are refined, whether or not chance explains the change; they are known to be rough, and the others
+  /// right.
   std::vector<FlightGroup> rough = {};
 };
 
@@ -60,7 +61,8 @@ struct FlightCalibration {
   ImuTriads axes;
   int pieces = 0, keyframes = 0, points = 0, views = 0;
   double duration_s = 0;
-  double sigma_px = 0, spread = 1;  ///< FlightNoise
+  double sigma_px = 0, spread = 1;                              ///< FlightNoise
+  double gyro_noise_radps_rthz = 0, accel_noise_mps2_rthz = 0;  ///< densities as the flights show them
 };
 
 /// `names`: of the flights. An error, one sentence, where the flights cannot be used or are too short.

@@ -83,7 +83,7 @@ TEST(FlightPiece, EquationsPredictHowTheCostFalls) {
   const FlightRig truth = flight_rig(rig);
   FlightPiece piece(tracks.keyframes, tracks.noise, tracks.gravity_mps2, truth);
   EXPECT_GT(piece.points(), 50);
-  piece.set_sigma_px(0.3);
+  piece.set_noise({.sigma_px = 0.3});
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(values(truth).size());
   for (int i = 0; i < 8; ++i) (void)piece.linearise(truth, 1e-9), piece.move(none);
   const CalibrationEquations e = piece.linearise(truth, 1e-9);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "fbvins/core/median.hpp"
 
@@ -14,6 +15,8 @@ constexpr int kMaxIterations = 25;
 constexpr double kLeastDamping = 1e-10;
 /// Decrease of the cost, in units of half a squared standard deviation, with which a fit has converged.
 constexpr double kConverged = 0.1;
+/// The noise of readings is looked for within so many halvings and doublings.
+constexpr int kMostHalvings = 5;
 /// Standard deviation over the median of absolute values, of a normal distribution.
 constexpr double kSigmaOverMedian = 1.4826;
 constexpr double kLeastSigma_px = 0.05;
@@ -60,7 +63,7 @@ Eigen::VectorXd prior_information(const FlightRig& given) {
 
 FlightFit fit_calibration(const FlightPieces& pieces, const FlightRig& given, const FlightRig& start,
                           const std::vector<bool>& free, const FlightNoise& noise) {
-  for (FlightPiece* piece : pieces) piece->set_sigma_px(noise.sigma_px);
+  for (FlightPiece* piece : pieces) piece->set_noise(noise);
   const Eigen::VectorXd prior = prior_information(given);
   FlightFit fit;
   fit.rig = start;
@@ -97,13 +100,51 @@ FlightFit fit_calibration(const FlightPieces& pieces, const FlightRig& given, co
   return fit;
 }
 
-double settled_cost(const FlightPieces& pieces, const FlightRig& rig, double sigma_px) {
+double settled_cost(const FlightPieces& pieces, const FlightRig& rig, const FlightNoise& noise) {
+  const std::vector<bool> none(static_cast<std::size_t>(values(rig).size()), false);
+  FlightNoise alone = noise;  // without a calibration that is fitted there is nothing to spread
+  alone.spread = 1;
+  double sum = 0;
+  for (FlightPiece* piece : pieces) sum += fit_calibration({piece}, rig, rig, none, alone).cost;
+  return sum;
+}
+
+namespace {
+
+double unlikelihood(const FlightPieces& pieces, const FlightRig& rig, const FlightNoise& noise) {
+  (void)settled_cost(pieces, rig, noise);
   double sum = 0;
   for (FlightPiece* piece : pieces) {
-    const std::vector<bool> none(static_cast<std::size_t>(values(rig).size()), false);
-    sum += fit_calibration({piece}, rig, rig, none, {.sigma_px = sigma_px}).cost;
+    (void)piece->linearise(rig, kLeastDamping);
+    sum += piece->unlikelihood();
   }
   return sum;
+}
+
+/// The power of two of `factor`, and where between powers a parabola has its minimum.
+void find_factor(const FlightPieces& pieces, const FlightRig& rig, double FlightNoise::*factor, FlightNoise& noise) {
+  std::map<int, double> cost;
+  const auto at = [&](int power) {
+    const auto [it, is_new] = cost.try_emplace(power, 0);
+    if (!is_new) return it->second;
+    FlightNoise tried = noise;
+    tried.*factor = std::exp2(power);
+    return it->second = unlikelihood(pieces, rig, tried);
+  };
+  int best = 0;
+  for (const int step : {-1, 1})
+    while (std::abs(best + step) <= kMostHalvings && at(best + step) < at(best)) best += step;
+  const double before = at(best - 1), here = at(best), after = at(best + 1), bend = before - 2 * here + after;
+  noise.*factor = std::exp2(best + (bend > 0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0));
+}
+
+}  // namespace
+
+FlightNoise with_noise_of_readings(const FlightPieces& pieces, const FlightRig& rig, const FlightNoise& noise) {
+  FlightNoise out = noise;
+  find_factor(pieces, rig, &FlightNoise::accel, out);
+  find_factor(pieces, rig, &FlightNoise::gyro, out);
+  return out;
 }
 
 double sigma_px_of(const FlightPieces& pieces, const FlightRig& rig) {
@@ -123,7 +164,7 @@ double spread_of(const FlightPieces& pieces, const FlightFit& fit, const FlightN
   std::vector<Eigen::VectorXd> gradients;
   Eigen::MatrixXd information;
   for (FlightPiece* piece : pieces) {
-    piece->set_sigma_px(noise.sigma_px);
+    piece->set_noise(noise);
     const CalibrationEquations e = piece->linearise(fit.rig, kLeastDamping);
     gradients.push_back(e.gradient);
     if (information.size() == 0) information = Eigen::MatrixXd::Zero(e.gradient.size(), e.gradient.size());

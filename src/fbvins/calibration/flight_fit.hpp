@@ -11,11 +11,6 @@ namespace fbvins {
 
 using FlightPieces = std::vector<FlightPiece*>;
 
-struct FlightNoise {
-  double sigma_px = 0.6;  ///< of a coordinate of a view
-  double spread = 1;      ///< variance of what pieces say of the calibration, over what their noise explains: 1 or more
-};
-
 struct FlightFit {
   FlightRig rig;
   Eigen::MatrixXd information;  ///< of all parameters by views and readings, `spread` regarded; empty if none is free
@@ -27,10 +22,12 @@ struct FlightFit {
 FlightFit fit_calibration(const FlightPieces& pieces, const FlightRig& given, const FlightRig& start,
                           const std::vector<bool>& free, const FlightNoise& noise);
 /// Half the sum of squares of what is seen and read, at its minimum over states and points.
-double settled_cost(const FlightPieces& pieces, const FlightRig& rig, double sigma_px);
+double settled_cost(const FlightPieces& pieces, const FlightRig& rig, const FlightNoise& noise);
 
 /// Standard deviation of a coordinate as the residuals show it: by their median, and regarding that points are fitted.
 double sigma_px_of(const FlightPieces& pieces, const FlightRig& rig);
+/// FlightNoise::gyro and accel that make the readings most likely; else as `noise`.
+FlightNoise with_noise_of_readings(const FlightPieces& pieces, const FlightRig& rig, const FlightNoise& noise);
 /// FlightNoise::spread, from what each piece says beside the others at a minimum over all parameters.
 double spread_of(const FlightPieces& pieces, const FlightFit& fit, const FlightNoise& noise);
 

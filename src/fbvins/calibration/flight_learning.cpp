@@ -45,14 +45,27 @@ class Choice {
     const Eigen::VectorXd off = step_between(given, survey.fit.rig);
     pull_ = information_ * off + prior_.cwiseProduct(off) / survey.noise.spread;
     findings_.assign(parameters_.size(), FlightFinding::refined);
+    const auto left = [&](std::size_t i) {
+      return std::ranges::find(question.left, parameters_[i].group) != question.left.end();
+    };
+    if (question.rough) know([&](std::size_t i) { return left(i); });
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);
       if (std::sqrt(std::max(0.0, covariance_(k, k))) > kDetermined * parameters_[i].prior_sigma)
         findings_[i] = FlightFinding::not_determined;
-      else if (std::ranges::find(question.left, parameters_[i].group) != question.left.end()) findings_[i] = FlightFinding::left;
+      else if (left(i)) findings_[i] = FlightFinding::left;
     }
-    while (drop_one()) {
+    while (!question.rough && drop_one()) {
     }
+  }
+
+  /// Of the other parameters the covariance is what it is with these as given.
+  template <class Known>
+  void know(const Known& known) {
+    std::vector<Eigen::Index> unknown;
+    for (const Eigen::Index k : all_)
+      if (!known(static_cast<std::size_t>(k))) unknown.push_back(k);
+    covariance_(unknown, unknown) = covariance_of(information_, prior_, unknown);
   }
 
   const std::vector<FlightFinding>& findings() const { return findings_; }
@@ -95,7 +108,7 @@ class Choice {
         largest =
             std::max(largest, std::abs(d[static_cast<Eigen::Index>(n)]) /
                                   parameters_[static_cast<std::size_t>(at[static_cast<std::size_t>(members[n])])].prior_sigma);
-      if (matters_ > 0) size = std::min(size, largest * largest / (matters_ * matters_));
+      size = std::min(size, largest * largest / (matters_ * matters_));
       if (size < least) least = size, dropped = &members;
     }
     if (dropped == nullptr) return false;
@@ -118,10 +131,11 @@ class Choice {
 FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given) {
   FlightSurvey out;
   const std::vector<bool> all(static_cast<std::size_t>(values(given).size()), true);
-  (void)settled_cost(pieces, given, out.noise.sigma_px);
+  (void)settled_cost(pieces, given, out.noise);
   out.noise.sigma_px = sigma_px_of(pieces, given);
   out.fit = fit_calibration(pieces, given, given, all, out.noise);
   out.noise.sigma_px = sigma_px_of(pieces, out.fit.rig);
+  out.noise = with_noise_of_readings(pieces, out.fit.rig, out.noise);
   out.fit = fit_calibration(pieces, given, out.fit.rig, all, out.noise);
   out.noise.spread = spread_of(pieces, out.fit, out.noise);
   return out;

@@ -29,8 +29,11 @@ FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given);
 struct FlightQuestion {
   std::vector<FlightGroup> left = {};  ///< groups that stay as given, whatever the survey says of them
   /// Changes below this part of the prior's standard deviation do not matter: a flight's own errors (features that drift, a lens
-  /// that no model describes) are as large, and a good calibration is better left alone. 0: all matter.
+  /// that no model describes) are as large, and a good calibration is better left alone.
   double matters = 0.2;
+  /// What is not in `left` is known to be rough, and what is, is not: what the flights determine of the rough groups is judged
+  /// with all others as given, and taken without asking whether chance explains it.
+  bool rough = false;
 };
 FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
                         const FlightQuestion& question);

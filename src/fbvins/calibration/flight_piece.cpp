@@ -86,13 +86,14 @@ ReadingAt reading_at(const std::vector<FlightKeyframe>& keyframes, std::size_t i
 
 FlightPiece::FlightPiece(std::vector<FlightKeyframe> keyframes, const ImuNoise& noise, double gravity_mps2,
                          const FlightRig& given)
-    : gravity_mps2_(gravity_mps2), given_offset_s_(given.time_offset_s), start_(keyframes.front().state) {
+    : gravity_mps2_(gravity_mps2), given_offset_s_(given.time_offset_s), assumed_(noise), start_(keyframes.front().state) {
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     states_.push_back(keyframes[i].state);
     readings_.push_back(reading_at(keyframes, i));
     if (i == 0) continue;
     const ImuBias& bias = keyframes[i - 1].state.bias;
-    steps_.push_back({integrated(keyframes[i].imu, noise, bias), derivatives_by_axes(keyframes[i].imu, noise, bias)});
+    steps_.push_back(
+        {keyframes[i].imu, integrated(keyframes[i].imu, noise, bias), derivatives_by_axes(keyframes[i].imu, noise, bias)});
   }
   duration_s_ = (keyframes.back().t - keyframes.front().t).seconds();
   for (SeenPoint& point : seen_points(keyframes, given)) {
@@ -100,6 +101,16 @@ FlightPiece::FlightPiece(std::vector<FlightKeyframe> keyframes, const ImuNoise& 
     for (const SeenPoint::View& view : point.views) own.views.push_back({view.keyframe, view.camera, view.pixel});
     points_.push_back(std::move(own));
   }
+}
+
+void FlightPiece::set_noise(const FlightNoise& noise) {
+  const bool other_readings = noise.gyro != noise_.gyro || noise.accel != noise_.accel;
+  noise_ = noise;
+  if (!other_readings) return;
+  ImuNoise scaled = assumed_;
+  scaled.gyro_noise_density_radps_rthz *= noise.gyro;
+  scaled.accel_noise_density_mps2_rthz *= noise.accel;
+  for (Step& step : steps_) step.between = integrated(step.segments, scaled, step.between.linearisation_bias());
 }
 
 int FlightPiece::views() const {
@@ -136,7 +147,7 @@ double FlightPiece::cost(const FlightRig& rig) const {
   for (const Point& point : points_)
     for (const View& view : point.views) {
       const auto pixel = view_of(rig, view.camera, place(rig, view.keyframe), point.p_W);
-      sum += loss(pixel ? (*pixel - view.pixel).squaredNorm() / (sigma_px_ * sigma_px_) : kUnseen * kUnseen);
+      sum += loss(pixel ? (*pixel - view.pixel).squaredNorm() / (noise_.sigma_px * noise_.sigma_px) : kUnseen * kUnseen);
     }
   return sum;
 }
@@ -224,9 +235,9 @@ void FlightPiece::add_point(const FlightRig& rig, double lambda, std::size_t ind
       cost += loss(kUnseen * kUnseen);
       continue;
     }
-    Vec2 r = (*pixel - view.pixel) / sigma_px_;
+    Vec2 r = (*pixel - view.pixel) / noise_.sigma_px;
     cost += loss(r.squaredNorm());
-    const double root = std::sqrt(weight(r.squaredNorm())), scale = root / sigma_px_;
+    const double root = std::sqrt(weight(r.squaredNorm())), scale = root / noise_.sigma_px;
     r *= root;
     d.state *= scale, d.point *= scale, d.calibration *= scale;
     if (e.keyframes.empty() || e.keyframes.back() != view.keyframe) {
@@ -297,7 +308,15 @@ CalibrationEquations FlightPiece::linearise(const FlightRig& rig, double lambda)
   out.information = C_ - B_.transpose() * solved;
   out.information = 0.5 * (out.information + out.information.transpose()).eval();
   out.gradient = calibration_gradient_ - solved.transpose() * gradient_;
+  cost_ = out.cost;
   return out;
+}
+
+double FlightPiece::unlikelihood() const {
+  double sum = cost_;
+  for (const Step& step : steps_) sum -= step.between.sqrt_information().diagonal().array().log().sum();
+  for (const PointEquations& e : eliminated_) sum -= 0.5 * std::log(e.covariance.determinant());
+  return sum + factor_.matrixLLT().diagonal().array().log().sum();
 }
 
 void FlightPiece::move(const Eigen::VectorXd& step) {

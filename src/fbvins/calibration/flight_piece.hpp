@@ -26,6 +26,12 @@ struct CalibrationEquations {
   Eigen::MatrixXd information;
 };
 
+struct FlightNoise {
+  double sigma_px = 0.6;       ///< of a coordinate of a view
+  double gyro = 1, accel = 1;  ///< of readings between keyframes, over what the odometry assumed
+  double spread = 1;           ///< variance of what pieces say of the calibration, over what their noise explains: 1 or more
+};
+
 class FlightPiece {
  public:
   /// Keyframes in order, each but the first with the readings since the one before. `given`: with which they were estimated.
@@ -36,13 +42,15 @@ class FlightPiece {
   int views() const;
   double duration_s() const { return duration_s_; }
 
-  /// Standard deviation of a coordinate of a view.
-  void set_sigma_px(double sigma_px) { sigma_px_ = sigma_px; }
+  void set_noise(const FlightNoise& noise);
   double cost(const FlightRig& rig) const;
   /// Distance of each view's coordinates from the prediction, px.
   std::vector<double> residuals_px(const FlightRig& rig) const;
 
   CalibrationEquations linearise(const FlightRig& rig, double lambda);
+  /// At the last linearisation, a minimum: minus the logarithm of how likely the readings are, whatever states and points are,
+  /// but for a constant. To be compared between noises of the readings.
+  double unlikelihood() const;
   /// States and points after a step of the calibration, by the last linearisation.
   void move(const Eigen::VectorXd& step);
   void undo();
@@ -57,6 +65,7 @@ class FlightPiece {
     std::vector<View> views;
   };
   struct Step {
+    std::vector<ImuSegment> segments;
     Preintegration between;
     Eigen::Matrix<double, 9, 15> by_axes;  ///< of the motion measured
   };
@@ -79,7 +88,9 @@ class FlightPiece {
   void add_calibration(const Columns& columns, const ViewDerivatives& d, const Vec2& r, Eigen::Index at, PointEquations& e);
   void eliminate(const PointEquations& e);
 
-  double gravity_mps2_, given_offset_s_, sigma_px_ = 0.6, duration_s_ = 0;
+  double gravity_mps2_, given_offset_s_, duration_s_ = 0;
+  ImuNoise assumed_;
+  FlightNoise noise_;
   std::vector<NavState<W>> states_, states_before_;
   NavState<W> start_;
   std::vector<ReadingAt> readings_;
@@ -89,6 +100,7 @@ class FlightPiece {
   // Of the last linearisation.
   std::vector<Columns> columns_;  ///< by camera
   int size_ = 0;                  ///< parameters of the calibration
+  double cost_ = 0;
   Eigen::MatrixXd A_, B_, C_;
   Eigen::VectorXd gradient_, calibration_gradient_;
   Eigen::LLT<Eigen::MatrixXd> factor_;

@@ -26,6 +26,46 @@ constexpr double kBiasNode_s = 0.5;
 constexpr double kDefaultSpacing_s = 0.02;
 constexpr int kRowGroups = 16;
 
+/// Stamps of readings and images may differ by a unit, in files from elsewhere.
+std::optional<Error> check_stamps(const std::vector<ImuSample>& imu, const std::vector<BoardView>& views) {
+  if (views.empty()) return std::nullopt;
+  const auto [first, last] =
+      std::minmax_element(views.begin(), views.end(), [](const BoardView& a, const BoardView& b) { return a.t < b.t; });
+  struct Stamps {
+    const char* of;
+    double first_s, length_s;
+  };
+  const Stamps images{"images", first->t.seconds(), (last->t - first->t).seconds()};
+  const Stamps readings{"IMU's readings", imu.front().t.seconds(), (imu.back().t - imu.front().t).seconds()};
+  for (const auto& [unit, factor] : {std::pair{"microseconds", 1e3}, std::pair{"milliseconds", 1e6}})
+    for (const auto& [a, b] : {std::pair{images, readings}, std::pair{readings, images}})
+      if (std::abs(factor * a.first_s - b.first_s) < 0.2 * b.first_s && factor * a.length_s > 0.3 * b.length_s &&
+          factor * a.length_s < 3 * b.length_s)
+        return refused(fmt::format("the stamps of the {} look like {}: nanoseconds are needed", a.of, unit));
+  return std::nullopt;
+}
+
+/// Gravity is in the accelerometer's columns.
+std::optional<Error> check_columns(const std::vector<ImuSample>& imu) {
+  const auto count = static_cast<double>(imu.size());
+  double gyro = 0, gyro_square = 0, accel = 0;
+  for (const ImuSample& s : imu)
+    gyro += s.gyro_radps.norm() / count, gyro_square += s.gyro_radps.squaredNorm() / count, accel += s.accel_mps2.norm() / count;
+  const bool is_gravity = gyro > 8 && gyro < 12 && gyro_square - gyro * gyro < 9;
+  if (!is_gravity || accel > 5) return std::nullopt;
+  return refused(fmt::format(
+      "gravity is in the gyroscope's readings ({:.1f} in the mean), not in the accelerometer's ({:.1f}): their columns are exchanged",
+      gyro, accel));
+}
+
+std::optional<Error> check_unit(double gravity) {
+  for (const auto& [unit, one] :
+       {std::pair{"g", 1.0}, std::pair{"thousandths of g", 1000.0}, std::pair{"cm/s^2", 980.665}, std::pair{"mm/s^2", 9806.65}})
+    if (std::abs(gravity / one - 1) < (one == 1 ? 0.2 : 0.01))
+      return refused(fmt::format("gravity is measured as {:.4g}: the accelerometer gives {}, m/s^2 are needed", gravity, unit));
+  return std::nullopt;
+}
+
 std::optional<Error> check_input(const ImuCameraInput& input) {
   if (input.cameras.empty() || static_cast<int>(input.cameras.size()) > kMostCameras)
     return refused(fmt::format("{} cameras are given: one to {} can be calibrated", input.cameras.size(), kMostCameras));
@@ -53,7 +93,8 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
     if (i > 0 && input.imu[i].t <= input.imu[i - 1].t)
       return refused(fmt::format("IMU reading {} is not later than the one before", i));
   }
-  return std::nullopt;
+  if (auto wrong = check_stamps(input.imu, input.views)) return wrong;
+  return check_columns(input.imu);
 }
 
 Result<TurnMatch> check_turns(const TurnMatch& match) {
@@ -223,8 +264,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   const double spacing_s = options.knot_spacing_s > 0 ? options.knot_spacing_s : std::max(kDefaultSpacing_s, 2.0 / rate_hz);
   CalibrationState state = first_state(first_path(body, data.readings, match->gyro_bias_radps, spacing_s, common->length_s()),
                                        spacing_s, *T_BC, *match, data.readings);
-  if (const double force = state.gravity_T.norm(); force > 0.8 && force < 1.2)
-    return refused(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force));
+  if (auto wrong = check_unit(state.gravity_T.norm())) return *wrong;
 
   CalibrationSetup setup = setup_of(input, options, median_of(sigmas), rate_hz);
   const double gyro_sigma = setup.gyro_sigma_radps, accel_sigma = setup.accel_sigma_mps2;

@@ -63,7 +63,8 @@ std::optional<Error> check_magnitudes(const Magnitudes& m, const Board& board, d
     return refused(fmt::format("gravity is measured as {:.3f} +- {:.3f} m/s^2: the accelerometer's scale is wrong{}",
                                m.gravity_mps2, m.gravity_sigma, off < kWorstAxes * given ? ", or has to be estimated" : ""));
   if (m.scale < 0 && -m.scale > kSure * m.scale_sigma)
-    return refused("the images move against the accelerometer: they, or the board's print, are mirrored");
+    return refused(
+        "the images move against the accelerometer: all of its signs are wrong, or the images, or the board's print, are mirrored");
   if (std::abs(m.scale - 1) > kWorstScale && std::abs(m.scale - 1) > kSure * m.scale_sigma)
     return refused(
         fmt::format("the board is not as large as its file says: {:.1f} +- {:.1f} mm by the accelerometer instead of {:.1f} mm",

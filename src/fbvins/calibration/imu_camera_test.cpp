@@ -152,6 +152,17 @@ TEST(ImuCamera, NamesWrongUnitsAndSizes) {
   wrong = r.input;
   for (ImuSample& s : wrong.imu) s.accel_mps2 /= 9.81;
   expect_refusal(wrong, "gives g");
+  for (ImuSample& s : wrong.imu) s.accel_mps2 *= 1000;
+  expect_refusal(wrong, "thousandths of g");
+  wrong = r.input;
+  for (ImuSample& s : wrong.imu) std::swap(s.gyro_radps, s.accel_mps2);
+  expect_refusal(wrong, "columns are exchanged");
+  wrong = r.input;
+  for (ImuSample& s : wrong.imu) s.accel_mps2 *= -1;
+  expect_refusal(wrong, "all of its signs are wrong");
+  wrong = r.input;
+  for (ImuSample& s : wrong.imu) s.t.ns /= 1000;
+  expect_refusal(wrong, "microseconds");
   wrong = r.input;
   for (ImuSample& s : wrong.imu) s.accel_mps2 *= 1.05;
   expect_refusal(wrong, "accelerometer's scale");

@@ -19,8 +19,10 @@ constexpr std::size_t kApart = 3;
 constexpr float kAcross_px = 8, kTurned_px = 8;
 /// Between which the scene moved across an edge; and in the whole recording.
 constexpr int kFewestPairs = 10, kFewestJudged = 20;
-/// Mean gradient of an edge, grey values a pixel of the small image: more than noise and vignetting have.
+/// Mean gradient of an edge, grey values a pixel of the small image: more than noise has. Vignetting has as much towards the edge
+/// of a wide lens's image, but nearly the same all around: what pixels within kAround_px have in common is no edge.
 constexpr double kEdge = 2;
+constexpr int kAround_px = 15;
 /// An edge agrees with its mean where it has this share of its strength: gain and light change.
 constexpr double kStrength = 0.35;
 constexpr double kMostlyThere = 0.8;
@@ -69,11 +71,41 @@ struct Looks {
   }
 };
 
-/// Whether an edge at the pixel stays while the scene moves across it.
-bool stays(const Looks& of, int x, int y, std::vector<Eigen::Vector2f>& gradients) {
+/// Of each pixel the mean over all looks of its surroundings' gradients.
+class SharedGradient {
+ public:
+  explicit SharedGradient(const std::vector<Look>& looks)
+      : width_(looks.front().image->width()), height_(looks.front().image->height()) {
+    sums_.assign(static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(height_ + 1), Eigen::Vector2d::Zero());
+    for (int y = 0; y < height_; ++y)
+      for (int x = 0; x < width_; ++x) {
+        Eigen::Vector2f here = Eigen::Vector2f::Zero();
+        if (x > 0 && y > 0 && x + 1 < width_ && y + 1 < height_)
+          for (const Look& look : looks) here += gradient(*look.image, x, y);
+        at(x + 1, y + 1) = at(x, y + 1) + at(x + 1, y) - at(x, y) + here.cast<double>() / static_cast<double>(looks.size());
+      }
+  }
+  Eigen::Vector2f around(int x, int y) {
+    const int left = std::max(1, x - kAround_px), right = std::min(width_ - 1, x + kAround_px + 1);
+    const int top = std::max(1, y - kAround_px), bottom = std::min(height_ - 1, y + kAround_px + 1);
+    const Eigen::Vector2d sum = at(right, bottom) - at(left, bottom) - at(right, top) + at(left, top);
+    return (sum / ((right - left) * (bottom - top))).cast<float>();
+  }
+
+ private:
+  Eigen::Vector2d& at(int x, int y) {
+    return sums_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_ + 1) + static_cast<std::size_t>(x)];
+  }
+
+  int width_, height_;
+  std::vector<Eigen::Vector2d> sums_;
+};
+
+/// Whether an edge at the pixel stays while the scene moves across it. `shared`: by vignetting.
+bool stays(const Looks& of, int x, int y, const Eigen::Vector2f& shared, std::vector<Eigen::Vector2f>& gradients) {
   const std::vector<Look>& looks = of.all;
   Eigen::Vector2f mean = Eigen::Vector2f::Zero();
-  for (std::size_t i = 0; i < looks.size(); ++i) mean += gradients[i] = gradient(*looks[i].image, x, y);
+  for (std::size_t i = 0; i < looks.size(); ++i) mean += gradients[i] = gradient(*looks[i].image, x, y) - shared;
   mean /= static_cast<float>(looks.size());
   const float strength = mean.norm();
   if (strength < kEdge) return false;
@@ -136,9 +168,10 @@ Image fixed_parts(const Looks& looks) {
   const int width = looks.all.front().image->width(), height = looks.all.front().image->height();
   Image seen(width, height, 255);
   std::vector<Eigen::Vector2f> gradients(looks.all.size());
+  SharedGradient shared(looks.all);
   for (int y = 1; y + 1 < height; ++y)
     for (int x = 1; x + 1 < width; ++x)
-      if (stays(looks, x, y, gradients)) seen.at(x, y) = 0;
+      if (stays(looks, x, y, shared.around(x, y), gradients)) seen.at(x, y) = 0;
   seen = shrunk(grown(seen, kGap_px), kGap_px);
   seen = grown(shrunk(seen, kSpeck_px), kSpeck_px);
   drop_small(seen, kSmallest_px);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "fbvins/camera/lens_numbers.hpp"
+
 namespace fbvins {
 
 namespace {
@@ -35,5 +37,7 @@ Camera changed(const Camera& camera, const LensChange& change) {
       model);
   return camera.with_lens(model);
 }
+
+bool in_range(const Camera& camera) { return outside_of_model(camera.model_name(), camera.distortion()).empty(); }
 
 }  // namespace fbvins

@@ -24,4 +24,7 @@ RadialNames radial_names(const Camera& camera);
 
 Camera changed(const Camera& camera, const LensChange& change);
 
+/// Whether its own parameters are in the range in which its model is defined.
+bool in_range(const Camera& camera);
+
 }  // namespace fbvins

@@ -184,11 +184,13 @@ BlockFit StereoProblem::linearise() const {
   return fit;
 }
 
-/// Backtracking along the step. False once the error hardly decreases.
+/// Backtracking along the step, within the range of the lens models. False once the error hardly decreases.
 bool StereoProblem::step_down(const VectorXd& step, double& error) {
-  for (const double share : {1.0, 0.5, 0.25, 0.1}) {
+  for (const double share : {1.0, 0.5, 0.25, 0.1, 0.03}) {
     const VectorXd there = x + share * step;
-    const double error_there = mean_error(matches_, Hypothesis(*rig_, there));
+    const Hypothesis at(*rig_, there);
+    if (!in_range(at.left) || !in_range(at.right)) continue;
+    const double error_there = mean_error(matches_, at);
     if (error_there >= error) continue;
     const bool goes_on = error_there < (1 - kHardly) * error;
     x = there, error = error_there;
