@@ -65,7 +65,7 @@ def benchmarks(root):
 def sources(root):
     """Sources that documents name, by the end of their path, are there; and each public header begins with what it is."""
     ends = set()
-    for folder in ("include", "src", "lab", "apps", "bench", "examples", "python", "tests", "training", "web"):
+    for folder in ("include", "src", "lab", "apps", "bench", "examples", "packaging", "python", "tests", "training", "web"):
         for path in (root / folder).rglob("*.*"):
             parts = path.relative_to(root).parts
             ends |= {"/".join(parts[i:]) for i in range(len(parts))}

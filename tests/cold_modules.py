@@ -9,8 +9,8 @@ import re
 import subprocess
 import sys
 
-# A quaternion that turns one vector: nine multiplications, which no module does in its inner loops.
-HARMLESS = re.compile(r"_ZNK5Eigen14QuaternionBase\w+_transformVector")
+# A quaternion that turns one vector, and one of a matrix: a few multiplications, which no module does in its inner loops.
+HARMLESS = re.compile(r"_ZNK5Eigen14QuaternionBase\w+_transformVector|_ZN5Eigen8internal26quaternionbase_assign_impl")
 OF_EIGEN = re.compile(r" [WV] (_ZNK?5Eigen\w+)$", re.M)
 
 
