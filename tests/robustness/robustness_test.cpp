@@ -191,10 +191,9 @@ TEST_P(Flight, CalibrationIsRefinedInFlight) {
   std::printf("%s extrinsics 2 deg wrong: off %s\n  on %s\n  left over %.3f deg\n", frontend().c_str(), off.text().c_str(),
               on.text().c_str(), wrong_rad(on) * 180 / M_PI);
   EXPECT_LT(wrong_rad(on), 0.3 * 0.0349);
-  // The estimated direction of gravity absorbs most of the rotation error, so the trajectory hardly shows it: klt has 6.1 mm
-  // without and 6.3 mm with online calibration, orb 5.4 mm and 6.1 mm.
-  EXPECT_LT(on.rmse_m(), 0.05);
-  EXPECT_LT(on.rmse_m(), 1.2 * off.rmse_m());
+  // The trajectory need not gain: the estimated direction of gravity absorbs most of the rotation, and readings that a wrong
+  // mounting contradicts count less (docs/derivations/integrity.md, I4c).
+  EXPECT_LT(on.rmse_m(), 0.025);
 }
 
 TEST_P(Flight, TimeOffsetIsFoundInFlight) {

@@ -233,6 +233,11 @@ Result<void> Ros2Subscriber::listen(bool reliable) {
   return node_->tell_of_reader(reader_.handle());
 }
 
+int Ros2Subscriber::publishers() const {
+  dds_subscription_matched_status_t status{};
+  return dds_get_subscription_matched_status(reader_.handle(), &status) < 0 ? 0 : static_cast<int>(status.current_count);
+}
+
 Result<void> Ros2Subscriber::look_around() {
   constexpr int kAtOnce = 64;
   std::array<void*, kAtOnce> samples{};

@@ -119,6 +119,8 @@ class Ros2Subscriber {
   Ros2Subscriber(const Ros2Subscriber&) = delete;
   Ros2Subscriber& operator=(const Ros2Subscriber&) = delete;
 
+  /// Number of matched publishers.
+  int publishers() const;
   /// Adapts to a publisher with another reliability; to be called periodically. An error where a publisher has another type.
   Result<void> look_around();
 
