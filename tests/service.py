@@ -203,7 +203,7 @@ class Service(unittest.TestCase):
         program.kill()
         program.communicate(timeout=120)
         self.assertGreater(self.keyframes_of(kept), 5)
-        program, manager = self.start(*arguments[:2], speed="@4")
+        program, manager = self.start(*arguments[:2], speed="@1")
         _, err = program.communicate(timeout=120)
         self.assertEqual(program.returncode, 0, err)
         self.assertIn("the flight knows where it is in the map", err, "the second flight must continue the first one's map")
