@@ -9,6 +9,7 @@
 #include <memory>
 #include <thread>
 
+#include "apps/command_line.hpp"
 #include "apps/commands.hpp"
 #include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
@@ -111,7 +112,7 @@ int bench(Arguments a) {
   if (!plan) return fail(plan.error().message);
   if (a.list) return list_cells(*plan);
   a.bench.out = a.out;
-  a.bench.program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "fbvins").string();
+  a.bench.program = program_folder() / "fbvins";
   if (!a.cell.empty()) return bench_cell(*plan, a);
   std::map<std::string, Reference> reference;
   if (!a.reference.empty()) {

@@ -2,6 +2,7 @@
 #include "apps/command_line.hpp"
 
 #include <fmt/format.h>
+#include <sys/auxv.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -29,10 +30,15 @@ exit codes: 0 success, 1 no pose could be estimated (doctor, --check: something 
 
 }  // namespace
 
-int hand_over(const HandedOver& command, char** argv) {
+std::filesystem::path program_folder() {
   std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::string program = self.parent_path() / command.program;
+  std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) self = std::filesystem::canonical(reinterpret_cast<const char*>(getauxval(AT_EXECFN)), error);
+  return self.parent_path();
+}
+
+int hand_over(const HandedOver& command, char** argv) {
+  const std::string program = program_folder() / command.program;
   execv(program.c_str(), argv);
   return fail(fmt::format("the command {} is in a program of its own, {}, which cannot be started: {}; ./dev build makes it",
                           command.command, program, std::generic_category().message(errno)));

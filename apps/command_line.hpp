@@ -4,6 +4,7 @@
 // compile the rest.
 #pragma once
 
+#include <filesystem>
 #include <initializer_list>
 
 #include "apps/commands.hpp"
@@ -18,6 +19,9 @@ struct HandedOver {
   const char* description;  ///< as in that program
   const char* program;
 };
+
+/// Where the running program is, without symbolic links; also where /proc is not mounted.
+std::filesystem::path program_folder();
 
 /// Replaces this process by the program that has the command; returns, with an error, only if that cannot be started.
 int hand_over(const HandedOver& command, char** argv);
