@@ -43,9 +43,26 @@ struct KnownLandmarkOptions {
   }
 };
 
+/// A vehicle that stands level before its first start (docs/derivations/alignment.md, A22-A24).
+struct StandingOptions {
+  double tilt_rad = 0;
+  double up_x = 0, up_y = 0, up_z = 1;
+
+  template <class V>
+  void visit(V&& v) {
+    v("tilt_rad", tilt_rad, "rad",
+      "at its first start the vehicle stands level to this standard deviation, the IMU's mounting included; 0: it may stand anyhow",
+      0.0, 0.2);
+    v("up_x", up_x, "", "the vehicle's up in the IMU's frame, any length", -1.0, 1.0);
+    v("up_y", up_y, "", "likewise", -1.0, 1.0);
+    v("up_z", up_z, "", "likewise", -1.0, 1.0);
+  }
+};
+
 struct EstimatorOptions {
   KeyframeOptions keyframes;
   KnownLandmarkOptions known_landmarks;
+  StandingOptions standing;
   UpDirection up = UpDirection::state;
   int max_iterations = 4;
   int max_landmarks = 300;
@@ -77,6 +94,7 @@ struct EstimatorOptions {
   void visit(V&& v) {
     v.group("keyframes", keyframes, "the sliding window");
     v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
+    v.group("standing", standing, "a vehicle that stands level before it flies");
     v("up", up, "state|fixed",
       "state: the direction of gravity in W is estimated; fixed: W is level and turns as gravity becomes better known");
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);

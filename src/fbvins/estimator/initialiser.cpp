@@ -78,6 +78,12 @@ void move_to(const Pose<G, B>& origin, InitialSolution& start) {
   }
 }
 
+std::optional<LevelStand> stand_of(const StandingOptions& o) {
+  const Vec3 up_B(o.up_x, o.up_y, o.up_z);
+  if (o.tilt_rad == 0 || up_B.isZero(0)) return std::nullopt;
+  return LevelStand{up_B.normalized(), o.tilt_rad};
+}
+
 }  // namespace
 
 Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before,
@@ -85,6 +91,7 @@ Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise,
     : gravity_mps2_(options.gravity_mps2),
       noise_(noise),
       before_(before),
+      stand_(stand_of(options.standing)),
       one_camera_(one_camera),
       structure_(options, WindowWeights{.estimate_tilt = false}) {}
 
@@ -117,7 +124,8 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   }
   remember(frame, at_rest);
   std::optional<InitialSolution> start;
-  const ImuBiasEstimate biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
+  ImuBiasEstimate biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
+  if (stand_ && !origin) biases = as_it_stands(biases, at_rest);
   if (at_rest && one_camera_) reason_ = HealthReason::waiting_for_motion_or_rest;  // rest shows no scale
   else if (at_rest) start = start_from_rest(biases);
   else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(biases, calibration);
@@ -145,11 +153,25 @@ void Initialiser::remember(const TrackedFrame& frame, bool at_rest) {
   while (static_cast<int>(frames_.size()) > kFrames) frames_.pop_front();
 }
 
-std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimate& biases) {
+std::vector<ImuSample> Initialiser::newest_readings() const {
   std::vector<ImuSample> readings;
   for (const ImuSegment& segment : readings_)
     readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1),
                     segment.samples.end());  // neighbours share a stamp
+  return readings;
+}
+
+/// While it stands the floor tells the accelerometer's bias, which is then known when the start comes.
+ImuBiasEstimate Initialiser::as_it_stands(const ImuBiasEstimate& prior, bool at_rest) {
+  if (at_rest) {
+    const RestEstimate rest = initialise_at_rest(newest_readings(), noise_, RestOptions{}, gravity_mps2_);
+    if (rest.at_rest) stood_ = standing_bias(prior, rest.force_mps2, *stand_, gravity_mps2_);
+  }
+  return stood_.value_or(prior);
+}
+
+std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimate& biases) {
+  std::vector<ImuSample> readings = newest_readings();
   for (ImuSample& reading : readings) reading.accel_mps2 -= biases.bias.accel_mps2;
   RestEstimate rest = initialise_at_rest(readings, noise_, RestOptions{}, gravity_mps2_);
   if (!rest.at_rest) {

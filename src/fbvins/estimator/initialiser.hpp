@@ -14,7 +14,7 @@
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/window_solver.hpp"
-#include "fbvins/types/imu_state.hpp"
+#include "fbvins/imu/standing_bias.hpp"
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
@@ -40,7 +40,7 @@ class Initialiser {
   }
   /// Takes the next frame; a solution when there is one, else reason() says what is missing.
   /// `rest`: how long the body has stood still. G is placed so that the first frame has the
-  /// position and heading of `origin`, if there is one.
+  /// position and heading of `origin`, if there is one; the vehicle may be in the air then.
   std::optional<InitialSolution> process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
                                          const std::optional<Pose<G, B>>& origin);
   HealthReason reason() const { return reason_; }
@@ -49,6 +49,8 @@ class Initialiser {
   bool by_one_camera(const TrackedFrame& frame) const;
   void remember(const TrackedFrame& frame, bool at_rest);
   int usable_features(const TrackedFrame& frame, bool at_rest) const;
+  std::vector<ImuSample> newest_readings() const;
+  ImuBiasEstimate as_it_stands(const ImuBiasEstimate& prior, bool at_rest);
   std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
   std::optional<InitialSolution> start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);
@@ -57,6 +59,8 @@ class Initialiser {
   double gravity_mps2_;
   ImuNoise noise_;
   std::optional<ImuState> before_;
+  std::optional<LevelStand> stand_;       ///< before the first start
+  std::optional<ImuBiasEstimate> stood_;  ///< as the floor has told them
   bool one_camera_;
   std::deque<TrackedFrame> frames_;
   std::deque<ImuSegment> readings_;  ///< of the last moments, to decide whether the body is at rest

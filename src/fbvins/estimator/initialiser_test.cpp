@@ -19,8 +19,11 @@ struct Started {
   HealthReason reason = HealthReason::none;
 };
 
-Started start(SimulatedFlight& flight, int frames, const std::optional<Pose<G, B>>& origin = {}, double rest_s_a_frame = 0) {
-  Initialiser initialiser(EstimatorOptions{}, flight.rig.imu_noise);
+Started start(SimulatedFlight& flight, int frames, const std::optional<Pose<G, B>>& origin = {}, double rest_s_a_frame = 0,
+              const StandingOptions& standing = {}) {
+  EstimatorOptions options;
+  options.standing = standing;
+  Initialiser initialiser(options, flight.rig.imu_noise);
   const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
   Started out;
   for (int k = 0; k < frames && !out.solution; ++k) {
@@ -55,6 +58,26 @@ TEST(Initialiser, StartsFromRest) {
   EXPECT_TRUE(s.solution->from_rest);
   EXPECT_LT((s.solution->states.back().bias.gyro_radps - flight.bias.gyro_radps).norm(), 5e-3);
   EXPECT_TRUE(s.solution->states.back().v_FB.isZero());
+}
+
+TEST(Initialiser, AVehicleThatStandsLevelKnowsItsTiltAndTheBias) {
+  SimulatedFlight flight(Motion(0, 0), 58);
+  flight.bias.accel_mps2 = Vec3(0.2, -0.15, 0);
+  const Vec3 up_B = flight.truth(0).T_FB.q.conjugate() * Vec3::UnitZ();
+  const StandingOptions standing{.tilt_rad = 0.002, .up_x = up_B.x(), .up_y = up_B.y(), .up_z = up_B.z()};
+  const auto tilt_error = [&](const Started& s) {
+    return (s.solution->states.back().T_FB.q.conjugate() * Vec3::UnitZ() - up_B).norm();
+  };
+  const Started anyhow = start(flight, 40, {}, 0.05), level = start(flight, 40, {}, 0.05, standing);
+  ASSERT_TRUE(anyhow.solution && level.solution);
+  EXPECT_GT(tilt_error(anyhow), 0.02);
+  EXPECT_LT(tilt_error(level), 0.001);
+  EXPECT_LT(up_B.cross(level.solution->biases.bias.accel_mps2 - flight.bias.accel_mps2).norm(), 0.01);
+  EXPECT_LT(up_B.unitOrthogonal().dot(level.solution->biases.accel_covariance * up_B.unitOrthogonal()), 0.021 * 0.021);
+
+  const Started in_the_air = start(flight, 40, Pose<G, B>{}, 0.05, standing);
+  ASSERT_TRUE(in_the_air.solution);
+  EXPECT_GT(tilt_error(in_the_air), 0.02) << "a start that is not the first one may be in the air";
 }
 
 TEST(Initialiser, PutsTheFirstFrameAtTheOriginGiven) {

@@ -88,6 +88,7 @@ RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, const ImuN
   if (!r.at_rest) return r;
   r.state.T_FB.q = level_rotation(s.accel_mean);  // eq. A2
   r.state.bias.gyro_radps = s.gyro_mean;
+  r.force_mps2 = s.accel_mean;
   return r;
 }
 

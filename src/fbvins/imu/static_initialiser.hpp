@@ -39,6 +39,7 @@ struct RestEstimate {
   /// In a new gauge: origin at the body, up along the mean specific force, no rotation about gravity (level_rotation),
   /// velocity and accelerometer bias zero.
   NavState<G> state;
+  Vec3 force_mps2 = Vec3::Zero();  ///< mean of the readings
   double gyro_spread_radps = 0;
   double accel_spread_mps2 = 0;
 };
