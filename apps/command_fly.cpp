@@ -75,7 +75,21 @@ Result<ControllerProgram> controller_of(const Arguments& a) {
   return ControllerProgram{ControllerProgram::Kind::ardupilot, binary, a.out + "/ardupilot"};
 }
 
-Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
+/// The vehicle stands on a level floor, to 0.2 degrees; the IMU is mounted on it to as much.
+constexpr double kStandingTilt_rad = 0.005;
+
+Result<void> stand_level(const SimulationOptions& simulation, Config& config) {
+  StandingOptions& standing = config.estimator.standing;
+  if (standing.tilt_rad > 0) return {};
+  const Result<StereoRig> rig = simulated_rig(simulation);
+  if (!rig) return rig.error();
+  const Vec3 up_B = imu_mounting(*rig, simulation.flight.camera_pitch_deg).q.conjugate() * Vec3::UnitZ();
+  standing = {kStandingTilt_rad, up_B.x(), up_B.y(), up_B.z()};
+  return {};
+}
+
+/// Adds to `config` how the vehicle stands.
+Result<FlightSetup> setup_of(const Arguments& a, Config& config) {
   FlightSetup setup;
   Result<Mission> mission = mission_of(a);
   if (!mission) return mission.error();
@@ -91,6 +105,7 @@ Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
   if (!a.control.empty())
     if (Result<void> read = read_yaml_file(a.control, fields_of(setup.control)); !read) return read.error();
   if (a.wind_mps >= 0) setup.wind.mean_mps = a.wind_mps, setup.wind.gust_mps = a.wind_mps * 2 / 3;
+  if (Result<void> done = stand_level(setup.simulation, config); !done) return done.error();
   setup.estimator.options = config;
   setup.wall_rate = a.wall_rate;
   setup.live = config.live;
@@ -156,7 +171,7 @@ Result<void> write_control(const FlightSetup& setup, const std::string& out) {
 }
 
 int fly_mission(Arguments a) {
-  const Result<Config> config = a.config.load();
+  Result<Config> config = a.config.load();
   if (!config) return fail(config.error().message);
   if (a.out.empty()) a.out = fmt::format("out/{}-{}-s{}-{}", a.mission_name(), a.preset, a.seed, config->frontend.kind);
   const Result<FlightSetup> setup = setup_of(a, *config);

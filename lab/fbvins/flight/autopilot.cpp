@@ -31,27 +31,23 @@ Autopilot::Autopilot(const Mission& mission, const ControlOptions& options, cons
       propagator_(EstimatorOptions{}.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
       controller_(options, rate_hz_),
       guide_(mission, rate_hz_),
-      reference_(mounting),
-      floor_(mounting) {}
+      reference_(mounting) {}
 
 void Autopilot::add(const Odometry& odometry) {
   propagator_.rebase(odometry);
   if (!odometry.health.has_pose()) return;
   newest_ = odometry;
-  level();
+  place_in_local();
 }
 
 void Autopilot::add(const MapUpdate& update) {
   if (!update.localised || update.reset_counter != reset_counter_) return;
   T_MW_ = update.T_MW_smooth;
-  level();
+  place_in_local();
 }
 
-/// Levels L by the floor, about the place where the vehicle stood.
-void Autopilot::level() {
-  if (!T_LM_) return;
-  const Pose<Local, W> T_LW = *T_LM_ * T_MW_;
-  T_LW_ = Pose<Local, Local>{floor_.correction(newest_, T_LW.q), Vec3::Zero()} * T_LW;
+void Autopilot::place_in_local() {
+  if (T_LM_) T_LW_ = *T_LM_ * T_MW_;
 }
 
 VehicleEstimate Autopilot::in_local(const LivePose& pose) const {
@@ -64,17 +60,15 @@ VehicleEstimate Autopilot::in_local(const LivePose& pose) const {
 }
 
 /// Places L at the standing vehicle, or, after a restart of the odometry, such that the vehicle keeps its last known position
-/// and heading. Position and heading only: W is gravity-aligned, and level() adds the floor's correction.
+/// and heading. Position and heading only: W is gravity-aligned.
 void Autopilot::place_local_frame(const LivePose& pose) {
   const Pose<M, BodyFlu> T_MV = T_MW_ * pose.T_WB * mounting_.inverse();
   const bool in_flight = T_LW_.has_value();
-  if (in_flight) floor_.forget();
-  else floor_.stand(newest_);
   const double yaw_L = in_flight ? heading(reference_.estimate().T_LV.q) : 0;
   const Vec3 p_L = in_flight ? reference_.estimate().T_LV.p : Vec3(Vec3::Zero());
   const Quat q_LM = so3_exp(Vec3(0, 0, yaw_L - heading(T_MV.q)));
   T_LM_ = Pose<Local, M>(q_LM, Vec3(p_L - q_LM * T_MV.p));
-  level();
+  place_in_local();
 }
 
 PerRotor Autopilot::update(const ImuSample& reading) {

@@ -15,7 +15,6 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/flight/flight_controller.hpp"
-#include "fbvins/flight/floor_level.hpp"
 #include "fbvins/flight/guide.hpp"
 #include "fbvins/flight/inertial_reference.hpp"
 #include "fbvins/flight/mission.hpp"
@@ -44,7 +43,7 @@ class Autopilot final : public FlightController {
  private:
   VehicleEstimate in_local(const LivePose& pose) const;
   void place_local_frame(const LivePose& pose);
-  void level();
+  void place_in_local();
   PerRotor act(double dt_s);
   void watch_ground(double dt_s);
 
@@ -57,7 +56,6 @@ class Autopilot final : public FlightController {
   Guide guide_;
   Failsafe failsafe_;
   InertialReference reference_;
-  FloorLevel floor_;
   Odometry newest_;  ///< the newest with a pose
   Pose<M, W> T_MW_;
   std::optional<Pose<Local, M>> T_LM_;  ///< heading and position only: both frames are level
