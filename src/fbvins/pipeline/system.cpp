@@ -21,8 +21,12 @@
 namespace fbvins {
 namespace {
 
-/// An error where lenses that see more than 180 degrees are too many, or are to be calibrated in flight.
-Result<void> check_faces(const LensFaces& lenses, const EstimatorOptions& options) {
+/// An error where a standing vehicle has no up, or where lenses that see more than 180 degrees are too many, or are to be
+/// calibrated in flight.
+Result<void> check_estimator(const EstimatorOptions& options, const LensFaces& lenses) {
+  const StandingOptions& s = options.standing;
+  if (s.tilt_rad > 0 && Vec3(s.up_x, s.up_y, s.up_z).isZero(0))
+    return Error{ErrorCode::invalid_argument, "estimator.standing: up_x, up_y and up_z are all zero: none says where up is"};
   if (!lenses.any()) return {};
   if (lenses.rig().camera_count() > kMostCameras)
     return Error{ErrorCode::unsupported,
@@ -227,7 +231,7 @@ Result<System> System::create(const SystemOptions& options, const StereoRig& rig
   if (Result<void> valid = validate(options); !valid) return valid.error();
   if (Result<void> good = check_rig(rig, "the rig"); !good) return good.error();
   LensFaces lenses(rig);
-  if (Result<void> good = check_faces(lenses, options.estimator); !good) return good.error();
+  if (Result<void> good = check_estimator(options.estimator, lenses); !good) return good.error();
   if (!parts.frontend) {
     Result<std::unique_ptr<Frontend>> frontend = make_frontend(lenses.rig(), options.frontend);
     if (!frontend) return frontend.error();

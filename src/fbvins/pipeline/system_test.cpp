@@ -159,6 +159,14 @@ TEST(SystemParts, ARigThatCannotFlyIsRefused) {
   EXPECT_FALSE(System::create({}, StereoRig{}));
 }
 
+TEST(SystemParts, AStandingVehicleWithoutAnUpIsRefused) {
+  SystemOptions options;
+  options.estimator.standing = {.tilt_rad = 0.005, .up_x = 0, .up_y = 0, .up_z = 0};
+  const Result<System> made = System::create(options, small_rig());
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().message, "estimator.standing: up_x, up_y and up_z are all zero: none says where up is");
+}
+
 TEST(SystemParts, ACustomFrontendGetsStampsReadingsAndLandmarksInOrder) {
   class Recorder final : public Frontend {
    public:
