@@ -188,8 +188,10 @@ int run(Arguments arguments) {
   std::optional<KeptMap> kept;
   const std::string kept_file = arguments.kept_map.empty() ? "" : arguments.map.save;
   if (*map)
-    kept.emplace(
-        **map, [from = map->get()] { return from->bytes(); }, kept_file);
+    kept.emplace(**map,
+                 KeptMap::Source{[from = map->get()] { return from->bytes(); },
+                                 [from = map->get()](bool anew) { return from->news(anew); }},
+                 kept_file);
   if (kept) kept->save_requested_to(arguments.map.save);
   LiveTotals totals;
   Troubles troubles;
@@ -228,7 +230,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command
       ->add_option(
           "--map", arguments->kept_map,
-          "a map kept from flight to flight: loaded if the file exists, written every half minute and at the end; with loop closure")
+          "a map kept from flight to flight: loaded if the file exists, kept every half minute and written at the end; with loop closure")
       ->excludes("--save-map")
       ->excludes("--load-map");
   command->add_option("--vocabulary", arguments->map.vocabulary,

@@ -84,7 +84,7 @@ std::vector<MapSession> remembered(const PlaceMap& map) {
   return out;
 }
 
-void put_memory(BytesOut& out, const PlaceMap& map, const std::vector<MapSession>& sessions) {
+void put_sessions(BytesOut& out, const std::vector<MapSession>& sessions) {
   out.put(static_cast<std::uint32_t>(sessions.size()));
   for (const MapSession& s : sessions) {
     out.put(s.number);
@@ -93,11 +93,9 @@ void put_memory(BytesOut& out, const PlaceMap& map, const std::vector<MapSession
     out.put(static_cast<std::int32_t>(s.keyframes));
     out.put(static_cast<std::int32_t>(s.loops));
   }
-  for (const MapKeyframe& k : map.keyframes())
-    if (k.placed) out.put(static_cast<std::int32_t>(k.missed));
 }
 
-void get_memory(BytesIn& in, PlaceMap& map) {
+void get_sessions(BytesIn& in, PlaceMap& map) {
   const auto sessions = in.get<std::uint32_t>();
   in.check(sessions > 1);
   for (std::uint32_t i = 0; i < sessions && in.ok(); ++i) {
@@ -110,7 +108,6 @@ void get_memory(BytesIn& in, PlaceMap& map) {
     in.check(map.sessions.empty() || s.number > map.sessions.back().number);
     map.sessions.push_back(s);
   }
-  for (MapKeyframe& k : map.keyframes()) k.missed = in.get<std::int32_t>();
 }
 
 }  // namespace
@@ -201,7 +198,7 @@ std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest) {
          (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory);
 }
 
-void put_rest(BytesOut& out, const PlaceMap& map, const MapRest& rest) {
+void put_rest(BytesOut& out, const MapRest& rest) {
   for (const MapEdge* e : rest.edges) put_edge(out, *e);
   if (!rest.name.empty()) {
     out.put(static_cast<std::uint32_t>(rest.name.size()));
@@ -211,7 +208,12 @@ void put_rest(BytesOut& out, const PlaceMap& map, const MapRest& rest) {
     out.put(static_cast<std::uint32_t>(rest.anchors.size()));
     for (const MapAnchor* a : rest.anchors) put_anchor(out, *a);
   }
-  if (!rest.sessions.empty()) put_memory(out, map, rest.sessions);
+  if (!rest.sessions.empty()) put_sessions(out, rest.sessions);
+}
+
+void put_missed(BytesOut& out, const PlaceMap& map) {
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.placed) out.put(static_cast<std::int32_t>(k.missed));
 }
 
 void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& map) {
@@ -228,7 +230,12 @@ void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& m
     in.check(map.find(a.keyframe) != nullptr);
     if (in.ok()) map.anchors.push_back(a);
   }
-  if (in.ok() && (flags & kMapMemory) != 0) get_memory(in, map);
+  if (in.ok() && (flags & kMapMemory) != 0) get_sessions(in, map);
+}
+
+void get_missed(BytesIn& in, std::uint32_t flags, PlaceMap& map) {
+  if (!in.ok() || (flags & kMapMemory) == 0) return;
+  for (MapKeyframe& k : map.keyframes()) k.missed = in.get<std::int32_t>();
 }
 
 }  // namespace fbvins

@@ -51,8 +51,11 @@ struct MapRest {
 };
 MapRest rest_of(const PlaceMap& map);
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest);
-void put_rest(BytesOut& out, const PlaceMap& map, const MapRest& rest);
+void put_rest(BytesOut& out, const MapRest& rest);
 /// Into a map that has its keyframes.
 void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& map);
+/// MapKeyframe::missed of each, where sessions are remembered.
+void put_missed(BytesOut& out, const PlaceMap& map);
+void get_missed(BytesIn& in, std::uint32_t flags, PlaceMap& map);
 
 }  // namespace fbvins
