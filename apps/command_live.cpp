@@ -185,10 +185,13 @@ int run(Arguments arguments) {
   const auto map =
       arguments.kept_map.empty() ? make_map(arguments.map, rig, config->loop) : make_kept_map(arguments.map, rig, config->loop);
   if (!map) return fail(map.error().message);
+  std::unique_ptr<Mapper> with_tags;
+  const Result<Mapper*> mapper = mapper_of(arguments.map, rig, map->get(), with_tags);
+  if (!mapper) return fail(mapper.error().message);
   std::optional<KeptMap> kept;
   const std::string kept_file = arguments.kept_map.empty() ? "" : arguments.map.save;
   if (*map)
-    kept.emplace(**map,
+    kept.emplace(**mapper,
                  KeptMap::Source{[from = map->get()] { return from->bytes(); },
                                  [from = map->get()](bool anew) { return from->news(anew); }},
                  kept_file);
@@ -233,6 +236,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
           "a map kept from flight to flight: loaded if the file exists, kept every half minute and written at the end; with loop closure")
       ->excludes("--save-map")
       ->excludes("--load-map");
+  command->add_option("--tags", arguments->map.tags, kTagsHelp);
   command->add_option("--vocabulary", arguments->map.vocabulary,
                       "vocabulary file for loop closure, instead of the one that ships");
   command

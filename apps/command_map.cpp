@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <ctime>
 #include <memory>
+#include <set>
 
 #include "apps/commands.hpp"
 #include "apps/map_edit_commands.hpp"
@@ -68,6 +69,9 @@ int info(const Arguments& arguments) {
              map->sessions.size(), loops, features, map->boosted ? "boosted " : "", points);
   if (!map->name.empty()) fmt::print("name: {}\n", map->name);
   if (map->anchored) fmt::print("in the frame of a building, by {} anchors\n", map->anchors.size());
+  std::set<int> tags;
+  for (const MapTag& t : map->tags) tags.insert(t.id);
+  if (!tags.empty()) fmt::print("tags that tie its flights: {}\n", fmt::join(tags, ", "));
   if (!map->empty())
     fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
   print_sessions(*map);

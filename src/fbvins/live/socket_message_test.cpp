@@ -111,6 +111,37 @@ TEST(SocketMessage, CalibrationsThatCannotBeAreRefused) {
   EXPECT_EQ(with([](auto& r) { r.time_offset_s = kNan; }), "calibration: the time offset is more than 10 s");
 }
 
+TEST(SocketMessage, TagsWithAndWithoutAPlace) {
+  FbvinsSocketTag tag{};
+  tag.header = {FBVINS_SOCKET_TAG, sizeof(tag)};
+  tag.t_ns = 77, tag.id = 5;
+  tag.p_BT[0] = 2, tag.q_BT[0] = 1;
+  for (int i = 0, n = 0; i < 6; n += 6 - i++) tag.covariance_BT[n] = 0.01 * (i + 1);
+  tag.covariance_BT[1] = 0.002;
+  const auto anchor_of = [&] {
+    const auto message = parse_socket_message(bytes_of(tag));
+    EXPECT_TRUE(message);
+    return std::get<SocketPosition>(*message).anchor;
+  };
+  const auto landmark = std::get<TagAnchor>(*anchor_of());
+  EXPECT_EQ(landmark.t, Time{77});
+  EXPECT_EQ(landmark.id, 5);
+  EXPECT_FALSE(landmark.has_place());
+  EXPECT_EQ(landmark.T_BT.p, Vec3(2, 0, 0));
+  EXPECT_EQ(landmark.covariance(1, 0), 0.002);
+  EXPECT_EQ(landmark.covariance(5, 5), 0.06);
+  tag.has_place = 1;
+  EXPECT_FALSE(anchor_of()) << "a place without an orientation";
+  tag.p_AT[1] = 3, tag.q_AT[0] = 1;
+  EXPECT_EQ(std::get<TagAnchor>(*anchor_of()).T_AT.p, Vec3(0, 3, 0));
+  for (double& p : tag.p_AT) p = kNan;
+  EXPECT_FALSE(anchor_of()) << "no landmark by accident";
+  tag.has_place = 0, tag.covariance_BT[0] = -1;
+  EXPECT_FALSE(anchor_of());
+  tag.t_ns = -1;
+  EXPECT_EQ(refusal(bytes_of(tag)), "tag: stamp -1 ns");
+}
+
 TEST(SocketMessage, PositionsAndHeights) {
   FbvinsSocketPosition position{};
   position.header = {FBVINS_SOCKET_POSITION, sizeof(position)};

@@ -195,7 +195,7 @@ Result<void> apply(BytesIn& in, const ByteSource& journal, const Blocks& blocks,
   get_changed(in, map);
   get_added(in, journal, blocks, map);
   const auto edges = in.get<std::uint32_t>();
-  map.name.clear(), map.anchors.clear(), map.sessions.clear();
+  map.name.clear(), map.anchors.clear(), map.tags.clear(), map.sessions.clear();
   get_rest(in, edges, flags, map);
   in.check(in.at_end());
   remember_sessions(map);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/loop/anchored_flight.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
@@ -39,8 +40,13 @@ class KeptFlight {
 
   void fly(int keyframes, double start_s, std::uint64_t seed) {
     const Pose<G, G> elsewhere(about_z(2.0), Vec3(5, -3, 1));
-    for (const Frame& f : flight(room(1), keyframes, 0.002, 0.02, seed, start_s))
-      closer_.process(f.place, keyframe(FrameId{f.t.ns}, f.t, elsewhere * f.odometry));
+    Rng rng(seed);
+    for (const Frame& f : flight(room(1), keyframes, 0.002, 0.02, seed, start_s)) {
+      Keyframe k = keyframe(FrameId{f.t.ns}, f.t, elsewhere * f.odometry);
+      k.anchors = seen_tags(f, rng, 0);
+      for (Anchor& a : k.anchors) std::get<TagAnchor>(a).T_AT = unknown_place();
+      closer_.process(f.place, k);
+    }
   }
   /// Returns how many bytes it took.
   std::size_t keep() {
@@ -94,6 +100,7 @@ TEST_F(Journal, WithItTheFileIsToTheByteTheMapAtTheLastNews) {
   EXPECT_GT(flight.map().size(), open_map(path_, 0)->base->keyframes.size()) << "some of the flight joined";
   EXPECT_EQ(fs::file_size(journal_), written[0] + written[1] + written[2] + written[3] + written[4] + written[5]);
   EXPECT_LT(written.back(), file.size() / 2);
+  EXPECT_GT(open_map(path_, 0)->tags.size(), 3u);
   EXPECT_EQ(flight.keep(), 0u) << "nothing is new";
   flight.closer().finish();
   ASSERT_TRUE(save_map(flight.map(), path_).ok());

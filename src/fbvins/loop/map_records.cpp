@@ -66,6 +66,23 @@ MapAnchor get_anchor(BytesIn& in) {
   return a;
 }
 
+void put_tag(BytesOut& out, const MapTag& t) {
+  out.put(t.keyframe.value);
+  out.put(static_cast<std::int32_t>(t.id));
+  out.put(t.T_BT);
+  put_information(out, t.covariance);
+}
+
+MapTag get_tag(BytesIn& in) {
+  MapTag t;
+  t.keyframe.value = in.get<std::int64_t>();
+  t.id = in.get<std::int32_t>();
+  t.T_BT = in.pose<Pose<B, Tag>>();
+  t.covariance = get_information(in);
+  in.check(t.covariance.allFinite() && Eigen::LLT<Mat6>(t.covariance).info() == Eigen::Success);
+  return t;
+}
+
 std::string get_name(BytesIn& in) {
   const auto n = in.get<std::uint32_t>();
   in.check(n > 0 && n <= kLongestName && n <= in.left());
@@ -188,6 +205,8 @@ MapRest rest_of(const PlaceMap& map) {
   rest.name = map.name.substr(0, kLongestName);
   for (const MapAnchor& a : map.anchors)
     if (kept.count(a.keyframe) > 0) rest.anchors.push_back(&a);
+  for (const MapTag& t : map.tags)
+    if (kept.count(t.keyframe) > 0) rest.tags.push_back(&t);
   rest.sessions = remembered(map);
   if (rest.sessions.size() == 1) rest.sessions.clear();
   return rest;
@@ -195,7 +214,7 @@ MapRest rest_of(const PlaceMap& map) {
 
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest) {
   return (map.boosted ? kMapBoosted : 0) | (rest.name.empty() ? 0 : kMapNamed) | (rest.anchors.empty() ? 0 : kMapAnchors) |
-         (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory);
+         (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory) | (rest.tags.empty() ? 0 : kMapTags);
 }
 
 void put_rest(BytesOut& out, const MapRest& rest) {
@@ -209,6 +228,9 @@ void put_rest(BytesOut& out, const MapRest& rest) {
     for (const MapAnchor* a : rest.anchors) put_anchor(out, *a);
   }
   if (!rest.sessions.empty()) put_sessions(out, rest.sessions);
+  if (rest.tags.empty()) return;
+  out.put(static_cast<std::uint32_t>(rest.tags.size()));
+  for (const MapTag* t : rest.tags) put_tag(out, *t);
 }
 
 void put_missed(BytesOut& out, const PlaceMap& map) {
@@ -231,6 +253,13 @@ void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& m
     if (in.ok()) map.anchors.push_back(a);
   }
   if (in.ok() && (flags & kMapMemory) != 0) get_sessions(in, map);
+  const std::uint32_t tags = in.ok() && (flags & kMapTags) != 0 ? in.get<std::uint32_t>() : 0;
+  in.check(tags > 0 || (flags & kMapTags) == 0);
+  for (std::uint32_t i = 0; i < tags && in.ok(); ++i) {
+    MapTag t = get_tag(in);
+    in.check(map.find(t.keyframe) != nullptr);
+    if (in.ok()) map.tags.push_back(t);
+  }
 }
 
 void get_missed(BytesIn& in, std::uint32_t flags, PlaceMap& map) {

@@ -64,6 +64,14 @@ struct MapAnchor {
   PartialPose measured;
 };
 
+/// A tag whose place in the building is not known, as a keyframe shows it.
+struct MapTag {
+  KeyframeId keyframe;
+  int id = 0;
+  Pose<B, Tag> T_BT;
+  Mat6 covariance = Mat6::Identity();  ///< of (dp in B, dtheta in the tag)
+};
+
 /// What the map remembers of a flight, or of a part of one between two restarts, though its keyframes may be gone.
 struct MapSession {
   std::uint32_t number = 0;
@@ -125,6 +133,7 @@ class PlaceMap {
 
   std::vector<MapEdge> edges;
   std::vector<MapAnchor> anchors;
+  std::vector<MapTag> tags;
   std::vector<MapSession> sessions;     ///< in order of number
   bool anchored = false;                ///< M is the frame A of the anchors
   Pose<B, C0> T_BC0;                    ///< of the camera that saw the places
