@@ -13,6 +13,7 @@
 #include "apps/terminal.hpp"
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/map_merge.hpp"
 #include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
@@ -67,6 +68,9 @@ int info(const Arguments& arguments) {
       std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
   fmt::print("{}: {} keyframes of {} sessions, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
              map->sessions.size(), loops, features, map->boosted ? "boosted " : "", points);
+  if (const std::size_t in_file = map->base ? map->base->keyframes.size() : 0; map->size() > in_file)
+    fmt::print("{} of the keyframes are in {}, of a flight that has not ended\n", map->size() - in_file,
+               journal_of(arguments.file));
   if (!map->name.empty()) fmt::print("name: {}\n", map->name);
   if (map->anchored) fmt::print("in the frame of a building, by {} anchors\n", map->anchors.size());
   std::set<int> tags;

@@ -203,11 +203,13 @@ class Service(unittest.TestCase):
         program.kill()
         program.communicate(timeout=120)
         self.assertGreater(self.keyframes_of(kept), 5)
+        self.assertTrue(pathlib.Path(f"{kept}.journal").exists(), "in flight what is new goes there")
         program, manager = self.start(*arguments[:2], speed="@1")
         _, err = program.communicate(timeout=120)
         self.assertEqual(program.returncode, 0, err)
         self.assertIn("the flight knows where it is in the map", err, "the second flight must continue the first one's map")
         self.assertGreater(self.keyframes_of(kept), 5)
+        self.assertFalse(pathlib.Path(f"{kept}.journal").exists(), "at its end the file has all")
 
     def keyframes_of(self, path):
         done = subprocess.run([PROGRAM, "map", "info", path], capture_output=True, text=True, timeout=120, check=True)
