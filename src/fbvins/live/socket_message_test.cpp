@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.4 of the protocol, this program 1.4");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.5 of the protocol, this program 1.5");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -134,7 +134,7 @@ TEST(SocketMessage, TagsWithAndWithoutAPlace) {
   EXPECT_FALSE(anchor_of()) << "a place without an orientation";
   tag.p_AT[1] = 3, tag.q_AT[0] = 1;
   EXPECT_EQ(std::get<TagAnchor>(*anchor_of()).T_AT.p, Vec3(0, 3, 0));
-  for (double& p : tag.p_AT) p = kNan;
+  for (double& p : tag.p_AT) p = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(anchor_of()) << "no landmark by accident";
   tag.has_place = 0, tag.covariance_BT[0] = -1;
   EXPECT_FALSE(anchor_of());
