@@ -126,7 +126,8 @@ void fuzz_stored(const std::string& bytes) {
 
 /// Of the map of many flights, all of which is new.
 std::string journal() {
-  PlaceMap map = *parse_map(std::as_bytes(std::span(map_of_many_flights())), "map");
+  const std::string bytes = map_of_many_flights();
+  PlaceMap map = *parse_map(std::as_bytes(std::span(bytes)), "map");
   map.base = nullptr;
   return *MapJournal().news(map);
 }
@@ -151,7 +152,8 @@ std::string with_its_blocks(std::string bytes, const PlaceMap& empty) {
 }
 
 void fuzz_journal(const std::string& bytes) {
-  const auto empty = parse_map(std::as_bytes(std::span(serialise_map(PlaceMap{}))), "map");
+  const std::string file = serialise_map(PlaceMap{});
+  const auto empty = parse_map(std::as_bytes(std::span(file)), "map");
   for (const std::string& journal : {bytes, with_its_blocks(bytes, *empty)}) {
     const auto map = with_journal(*empty, *bytes_in_memory(journal), "map");
     require_sentence(map);
