@@ -185,11 +185,16 @@ int run(Arguments arguments) {
   const auto map =
       arguments.kept_map.empty() ? make_map(arguments.map, rig, config->loop) : make_kept_map(arguments.map, rig, config->loop);
   if (!map) return fail(map.error().message);
+  std::unique_ptr<Mapper> with_tags;
+  const Result<Mapper*> mapper = mapper_of(arguments.map, rig, map->get(), with_tags);
+  if (!mapper) return fail(mapper.error().message);
   std::optional<KeptMap> kept;
   const std::string kept_file = arguments.kept_map.empty() ? "" : arguments.map.save;
   if (*map)
-    kept.emplace(
-        **map, [from = map->get()] { return from->bytes(); }, kept_file);
+    kept.emplace(**mapper,
+                 KeptMap::Source{[from = map->get()] { return from->bytes(); },
+                                 [from = map->get()](bool anew) { return from->news(anew); }},
+                 kept_file);
   if (kept) kept->save_requested_to(arguments.map.save);
   LiveTotals totals;
   Troubles troubles;
@@ -228,9 +233,10 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command
       ->add_option(
           "--map", arguments->kept_map,
-          "a map kept from flight to flight: loaded if the file exists, written every half minute and at the end; with loop closure")
+          "a map kept from flight to flight: loaded if the file exists, kept every half minute and written at the end; with loop closure")
       ->excludes("--save-map")
       ->excludes("--load-map");
+  command->add_option("--tags", arguments->map.tags, kTagsHelp);
   command->add_option("--vocabulary", arguments->map.vocabulary,
                       "vocabulary file for loop closure, instead of the one that ships");
   command

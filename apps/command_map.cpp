@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <ctime>
 #include <memory>
+#include <set>
 
 #include "apps/commands.hpp"
 #include "apps/map_edit_commands.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/map_merge.hpp"
 #include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
@@ -66,8 +68,14 @@ int info(const Arguments& arguments) {
       std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
   fmt::print("{}: {} keyframes of {} sessions, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
              map->sessions.size(), loops, features, map->boosted ? "boosted " : "", points);
+  if (const std::size_t in_file = map->base ? map->base->keyframes.size() : 0; map->size() > in_file)
+    fmt::print("{} of the keyframes are in {}, of a flight that has not ended\n", map->size() - in_file,
+               journal_of(arguments.file));
   if (!map->name.empty()) fmt::print("name: {}\n", map->name);
   if (map->anchored) fmt::print("in the frame of a building, by {} anchors\n", map->anchors.size());
+  std::set<int> tags;
+  for (const MapTag& t : map->tags) tags.insert(t.id);
+  if (!tags.empty()) fmt::print("tags that tie its flights: {}\n", fmt::join(tags, ", "));
   if (!map->empty())
     fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
   print_sessions(*map);

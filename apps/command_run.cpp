@@ -105,8 +105,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
                       "vocabulary file for loop closure, instead of the one that ships");
   command->add_option("--positions", arguments->flight.map.positions,
                       "CSV of positions or heights in the building's frame; with loop closure (docs/maps.md)");
-  command->add_option("--tags", arguments->flight.map.tags,
-                      "YAML of AprilTags at known places in the building; with loop closure (docs/maps.md)");
+  command->add_option("--tags", arguments->flight.map.tags, kTagsHelp);
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <utility>
 
 #include "apps/terminal.hpp"
+#include "fbvins/loop/map_journal.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -15,6 +17,7 @@ constexpr Duration kWritePeriod{30'000'000'000};
 /// Whether the file is out of the way.
 bool make_room(const std::string& file, const std::string& problem) {
   const Result<std::string> aside = set_aside(file);
+  if (aside) (void)std::rename(journal_of(file).c_str(), journal_of(*aside).c_str());  // it belongs to the file
   if (aside) warn(fmt::format("{}; it is kept as {}, and the flight begins a new map", problem, *aside));
   else warn(fmt::format("{}; {}: the flight's map will not be written", problem, aside.error().message));
   return aside.ok();
@@ -22,7 +25,7 @@ bool make_room(const std::string& file, const std::string& problem) {
 
 }  // namespace
 
-KeptMap::KeptMap(Mapper& map, std::function<Result<std::string>()> bytes, std::string file, WriteFile write)
+KeptMap::KeptMap(Mapper& map, Source bytes, std::string file, WriteFile write)
     : map_(map), bytes_(std::move(bytes)), file_(std::move(file)), writer_(std::move(write)) {}
 
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
@@ -44,9 +47,14 @@ MapUpdate KeptMap::process(const Keyframe& keyframe) {
 }
 
 void KeptMap::write(const std::string& file, const Told& told) {
-  Result<std::string> bytes = bytes_();
-  if (bytes) writer_.write(file, *std::move(bytes), told);
-  else told(bytes.error());
+  const bool kept = !file_.empty() && file == file_;
+  Result<std::string> bytes = kept ? bytes_.news(lost_) : bytes_.whole();
+  if (!bytes) return told(bytes.error());
+  if (bytes->empty()) return told({});
+  writer_.write(file, *std::move(bytes), [this, kept, told](const Result<void>& saved) {
+    if (kept) lost_ = !saved;
+    told(saved);
+  });
 }
 
 void KeptMap::finish() {

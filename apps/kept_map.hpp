@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map of a live flight, written periodically during the flight, so that a killed program leaves a map.
+// The map of a live flight, kept during the flight in a journal beside its file, so that a killed program leaves a map.
 #pragma once
 
 #include <functional>
@@ -11,6 +11,7 @@
 #include "apps/file_writer.hpp"
 #include "apps/run_map.hpp"
 #include "fbvins/core/time.hpp"
+#include "fbvins/loop/map_file.hpp"
 #include "fbvins/types/mapper.hpp"
 
 namespace fbvins::app {
@@ -21,8 +22,14 @@ class KeptMap final : public Mapper {
  public:
   using Told = FileWriter::Told;
 
-  /// `file` empty: the map is written only on request. `map` must outlive this; `bytes` are those of its file.
-  KeptMap(Mapper& map, std::function<Result<std::string>()> bytes, std::string file, WriteFile write = write_file_atomically);
+  /// Bytes for write_map_bytes().
+  struct Source {
+    std::function<Result<std::string>()> whole;          ///< LoopMap::bytes
+    std::function<Result<std::string>(bool anew)> news;  ///< LoopMap::news
+  };
+
+  /// `file`, whose journal is kept, empty: the map is written only on request. `map` must outlive this.
+  KeptMap(Mapper& map, Source bytes, std::string file, WriteFile write = write_map_bytes);
   MapUpdate process(const Keyframe& keyframe) override;
 
   /// Until the file being written is complete.
@@ -30,7 +37,7 @@ class KeptMap final : public Mapper {
   /// After the last keyframe: waits until the file being written is complete, and tells those who still wait for one that none
   /// comes. Nobody is told anything afterwards.
   void finish();
-  /// To be called before the first keyframe: the file for requested maps.
+  /// To be called before the first keyframe: the file for requested maps. The kept one gets its journal brought up to date.
   void save_requested_to(std::string file) { requested_file_ = std::move(file); }
   /// The map is written after the next keyframe, once for all who have asked until then; `told` is called on the writer's thread.
   /// False: too many wait already. From any thread.
@@ -43,9 +50,10 @@ class KeptMap final : public Mapper {
   void write(const std::string& file, const Told& told);
 
   Mapper& map_;
-  std::function<Result<std::string>()> bytes_;
+  Source bytes_;
   std::string file_, requested_file_;
   Time written_;         ///< keyframe's time
+  bool lost_ = false;    ///< the last news; while the writer is not idle, its thread's
   bool warned_ = false;  ///< on the writer's thread
   std::mutex mutex_;
   std::vector<Told> wanted_;          ///< guarded by mutex_

@@ -75,8 +75,17 @@ class KeptMapTest : public ::testing::Test {
 
   CountingMapper mapper;
   SlowDisk disk;
-  KeptMap kept{mapper, [this] { return "map of " + std::to_string(mapper.keyframes); }, "flat.fbm",
+  KeptMap kept{mapper,
+               {.whole = [this] { return "map of " + std::to_string(mapper.keyframes); },
+                .news =
+                    [this](bool anew) {
+                      if (mapper.keyframes == told_of) return std::string();
+                      told_of = mapper.keyframes;
+                      return (anew ? "anew " : "news ") + std::to_string(mapper.keyframes);
+                    }},
+               "flat.fbm",
                [this](const std::string& path, std::string_view bytes) { return disk.write(path, bytes); }};
+  int told_of = 0;
 };
 
 TEST_F(KeptMapTest, ASlowDiskHoldsUpNoKeyframeAndTheNewestMapIsNext) {
@@ -86,13 +95,38 @@ TEST_F(KeptMapTest, ASlowDiskHoldsUpNoKeyframeAndTheNewestMapIsNext) {
   disk.wait_for_begin(1);
   for (int second = 32; second < 300; ++second) EXPECT_EQ(kept.process(at_s(second)).t, at_s(second).t);
   ASSERT_EQ(disk.begun().size(), 1u) << "one file at a time, and no map waits in memory";
-  EXPECT_EQ(disk.begun()[0].second, "map of 3");
+  EXPECT_EQ(disk.begun()[0].second, "news 3");
   disk.finish(1);
   kept.finish();
   kept.process(at_s(300));
   disk.wait_for_begin(2);
   EXPECT_EQ(disk.begun()[1].first, "flat.fbm");
-  EXPECT_EQ(disk.begun()[1].second, "map of 272");
+  EXPECT_EQ(disk.begun()[1].second, "news 272");
+}
+
+TEST_F(KeptMapTest, AfterNewsThatWereLostAllIsWrittenAgain) {
+  disk.open(Error{ErrorCode::unwritable, "full"});
+  for (const int second : {0, 31, 62}) kept.process(at_s(second)), kept.wait();
+  disk.open();
+  for (const int second : {93, 124}) kept.process(at_s(second)), kept.wait();
+  std::vector<std::string> written;
+  for (const auto& [path, bytes] : disk.begun()) written.push_back(bytes);
+  EXPECT_EQ(written, (std::vector<std::string>{"news 2", "anew 3", "anew 4", "news 5"}));
+}
+
+TEST_F(KeptMapTest, WhoAsksForTheKeptMapGetsItsNewsAndIsToldAtOnceWhereThereAreNone) {
+  std::vector<bool> told;
+  kept.save_requested_to("flat.fbm");
+  disk.open();
+  for (const int second : {0, 1}) {
+    kept.request_save([&](const Result<void>& saved) { told.push_back(saved.ok()); });
+    kept.process(at_s(second));
+    kept.wait();
+    told_of = mapper.keyframes + 1;  // nothing changes with the next one
+  }
+  EXPECT_EQ(told, (std::vector<bool>{true, true}));
+  ASSERT_EQ(disk.begun().size(), 1u);
+  EXPECT_EQ(disk.begun()[0], (std::pair<std::string, std::string>{"flat.fbm", "news 1"}));
 }
 
 TEST_F(KeptMapTest, ARequestedMapIsToldWhenItIsWritten) {
@@ -137,12 +171,12 @@ TEST_F(KeptMapTest, OneFileServesAllWhoAskedAndTheEndTellsTheRest) {
 }
 
 TEST_F(KeptMapTest, AMapOfWhichAPartCannotBeReadIsToldAndNotWritten) {
-  KeptMap unreadable(
-      mapper,
-      []() -> Result<std::string> {
-        return Error{ErrorCode::malformed, "flat.fbm: damaged map"};
-      },
-      "", [this](const std::string& path, std::string_view bytes) { return disk.write(path, bytes); });
+  KeptMap unreadable(mapper,
+                     {.whole = []() -> Result<std::string> {
+                        return Error{ErrorCode::malformed, "flat.fbm: damaged map"};
+                      },
+                      .news = {}},
+                     "", [this](const std::string& path, std::string_view bytes) { return disk.write(path, bytes); });
   unreadable.save_requested_to("wish.fbm");
   std::string told;
   unreadable.request_save([&](const Result<void>& saved) { told = saved ? "saved" : saved.error().message; });
@@ -180,6 +214,7 @@ class MakeKeptMap : public ::testing::Test {
 
 TEST_F(MakeKeptMap, ADamagedFileIsSetAsideAndTheFlightKeepsANewMap) {
   std::ofstream(file) << "rubbish";
+  std::ofstream(file + ".journal") << "of it";
   MapArguments arguments;
   arguments.load = arguments.save = file;
   const auto map = make_kept_map(arguments, rig(), {});
@@ -188,6 +223,8 @@ TEST_F(MakeKeptMap, ADamagedFileIsSetAsideAndTheFlightKeepsANewMap) {
   EXPECT_EQ(arguments.save, file);
   EXPECT_FALSE(std::filesystem::exists(file));
   EXPECT_EQ(std::filesystem::file_size(file + ".bad"), 7u);
+  EXPECT_FALSE(std::filesystem::exists(file + ".journal"));
+  EXPECT_EQ(std::filesystem::file_size(file + ".bad.journal"), 5u) << "they belong together";
 }
 
 TEST_F(MakeKeptMap, WithoutAFolderTheFlightHasAMapAndKeepsNone) {

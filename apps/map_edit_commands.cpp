@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -56,6 +57,12 @@ int rename(const Edit& edit) {
   return save(*map, edit.output.empty() ? edit.file : edit.output);
 }
 
+/// To so many decimals, and never minus zero.
+double rounded(double value, int decimals) {
+  const double unit = std::pow(10, decimals);
+  return std::round(value * unit) / unit + 0.0;
+}
+
 int align(const Edit& edit) {
   constexpr std::size_t kNumbers = 6;  // of a point
   if (edit.points.size() % kNumbers != 0)
@@ -70,7 +77,8 @@ int align(const Edit& edit) {
   const auto done = align_map(*map, points);
   if (!done) return fail(fmt::format("{}: {}", edit.file, done.error().message));
   fmt::print("turned by {:.2f} degrees, moved by {:.3f}, {:.3f}, {:.3f} m; the points fit to {:.3f} m\n",
-             done->heading_rad / kDegree, done->moved_m.x(), done->moved_m.y(), done->moved_m.z(), done->rms_m);
+             rounded(done->heading_rad / kDegree, 2), rounded(done->moved_m.x(), 3), rounded(done->moved_m.y(), 3),
+             rounded(done->moved_m.z(), 3), done->rms_m);
   return save(*map, edit.output);
 }
 

@@ -43,6 +43,8 @@ struct MapRecord {
 
 /// The anchors of --positions, in order of time; none without it.
 Result<std::vector<Anchor>> positions_of(const MapArguments& arguments);
+inline constexpr const char* kTagsHelp =
+    "YAML of AprilTags, at known places in the building or anywhere; with loop closure (docs/maps.md)";
 /// The map itself or, with --tags, one that finds them in its keyframes, which is kept in `with_tags`.
 Result<Mapper*> mapper_of(const MapArguments& arguments, const StereoRig& rig, LoopMap* map, std::unique_ptr<Mapper>& with_tags);
 

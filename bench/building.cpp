@@ -5,6 +5,7 @@
 //   building make --keyframes 100000 -o building.fbm
 //   building fly building.fbm --starts 200 --memory-mb 50          prints a row of a Markdown table
 //   building fly building.fbm --starts 200 --whole                 with the whole map in memory
+//   building keep building.fbm                                     a flight of two minutes, kept every half minute
 #include <fcntl.h>
 #include <fmt/format.h>
 
@@ -17,6 +18,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,7 @@
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/test_room.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 
@@ -199,6 +202,44 @@ int fly(const Arguments& a, const Vocabulary& vocabulary) {
   return closer.map().store && closer.map().store->damage() ? 2 : 0;
 }
 
+/// A flight that is kept in a journal, as `fbvins live --map` does.
+int keep(const Arguments& a, const Vocabulary& vocabulary) {
+  constexpr int kPieces = 4, kOfAPiece = 150;  // five keyframes a second
+  constexpr std::uint64_t kMB = 1'000'000;
+  Result<PlaceMap> map = open_map(a.file, kMB * static_cast<std::uint64_t>(a.memory_mb));
+  if (!map) return fmt::print(stderr, "{}\n", map.error().message), 2;
+  LoopOptions options;
+  options.max_keyframes = 1'000'000;
+  const std::size_t keyframes = map->size();
+  LoopCloser closer(test_room::rig(), options, vocabulary, *std::move(map));
+  MapJournal journal;
+  Rng rng(5);
+  const test_room::World world = room(0, vocabulary);
+  for (int i = 0; i < kPieces * kOfAPiece; ++i) {
+    const Pose<G, B> truth = test_room::true_pose(0.1 + 0.2 * i);
+    Place place = test_room::view(world, truth, rng);
+    place.words = vocabulary.words_of(place.descriptors);
+    const Time t = Time{1'000'000'000'000'000} + Duration::from_seconds(0.2 * i);
+    (void)closer.process(std::move(place), test_room::keyframe(FrameId{i}, t, truth));
+    if (i % kOfAPiece < kOfAPiece - 1) continue;
+    CpuTimer cpu;
+    const std::optional<PlaceMap> reduced = closer.reduced();
+    const double judged_ms = cpu.lap_ms();
+    const Result<std::string> news = journal.news(reduced ? *reduced : closer.map());
+    const double made_ms = cpu.lap_ms();
+    Stopwatch watch;
+    if (!news || !write_map_bytes(a.file, *news)) return fmt::print(stderr, "{}: cannot be kept\n", a.file), 2;
+    fmt::print("| {} | {:.0f} | {} | {:.2f} | {:.0f} | {:.0f} | {:.0f} |\n", keyframes,
+               static_cast<double>(std::filesystem::file_size(a.file)) / 1e6, closer.map().size() - keyframes,
+               static_cast<double>(news->size()) / 1e6, judged_ms, made_ms, watch.lap_ms());
+  }
+  Stopwatch watch;
+  const Result<PlaceMap> again = open_map(a.file, kMB * static_cast<std::uint64_t>(a.memory_mb));
+  fmt::print("opened again with {} keyframes in {:.2f} s\n", again ? again->size() : 0, watch.lap_ms() / 1000);
+  remove_journal(a.file);
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -214,11 +255,15 @@ int main(int argc, char** argv) {
   flying->add_option("--memory-mb", a.memory_mb)->check(CLI::NonNegativeNumber);
   flying->add_flag("--whole", a.whole, "all of the map in memory");
   flying->add_flag("--cold", a.cold, "the operating system forgets the file before each query");
+  CLI::App* keeping = app.add_subcommand("keep", "rows of a table: one for each half minute");
+  keeping->add_option("map", a.file)->required();
+  keeping->add_option("--memory-mb", a.memory_mb)->check(CLI::NonNegativeNumber);
   CLI11_PARSE(app, argc, argv);
   const auto vocabulary = Vocabulary::open(shipped_vocabulary());
   if (!vocabulary) {
     fmt::print(stderr, "{}\n", vocabulary.error().message);
     return 2;
   }
+  if (keeping->parsed()) return keep(a, *vocabulary);
   return making->parsed() ? make(a, *vocabulary) : fly(a, *vocabulary);
 }

@@ -78,7 +78,7 @@ def main():
         done = run(program, recording, "--out", root / "again", "--load-map", root / "map.fbm")
         assert done.returncode == 0 and worst_m(root / "again", truth) < 0.12, done.stderr
         refused(program, recording, root, "--positions", "1,2,3\n", "wrong:1: 3 columns")
-        refused(program, recording, root, "--tags", "family: tag36h11\nsize_m: 0.2\ntags:\n  - {id: 3}\n", "position_m: is missing")
+        refused(program, recording, root, "--tags", "family: tag36h11\nsize_m: 0.2\ntags:\n  - {id: 3, facing_deg: 0}\n", "position_m: is missing")
     return 0
 
 

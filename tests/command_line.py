@@ -194,6 +194,8 @@ class CommandLine(unittest.TestCase):
         done = fbvins("map", "align", maps["named"], "-o", maps["aligned"], "--points", *corners)
         self.assertEqual(done.returncode, 0, done)
         self.assertIn("turned by 90.00 degrees, moved by 10.000, 20.000, 0.000 m", done.stdout)
+        hardly = ["0,0,0,-0.0001,0,-0.0001", "4,0,0,3.9999,-0.0001,-0.0001", "0,3,1,-0.0001,3,0.9999"]
+        self.assertIn("turned by 0.00 degrees, moved by 0.000, 0.000, 0.000 m; ", fbvins("map", "align", maps["a"], "-o", maps["cut"], "--points", *hardly).stdout)
         self.assert_bad_input(fbvins("map", "align", maps["a"], "-o", maps["cut"], "--points", *corners[:2]), "2 points are given where three are needed")
         self.assert_bad_input(fbvins("map", "cut", maps["a"], "-o", maps["cut"], "--box", "50,50,50,51,51,51"), "none of its")
         self.assertEqual(fbvins("map", "cut", maps["aligned"], "-o", maps["cut"], "--box", "-99,-99,-99,99,99,99").returncode, 0)

@@ -105,6 +105,22 @@ class PySystem {
   void push_height(nb::handle t, double height, double sigma, nb::handle point) {
     push_anchor(HeightAnchor{Time{whole_number(t, "t")}, height, sigma, point_of(point)});
   }
+  /// Without a place the tag is a landmark of the map.
+  void push_tag(nb::handle t, int id, nb::handle position, nb::handle orientation, nb::handle covariance, nb::handle place,
+                nb::handle facing) {
+    if (place.is_none() != facing.is_none()) throw nb::value_error("place and place_orientation: both or neither");
+    TagAnchor anchor{.t = Time{whole_number(t, "t")},
+                     .id = id,
+                     .T_AT = unknown_place(),
+                     .T_BT = {quaternion(orientation, "orientation"), vector3(position, "position")}};
+    if (!place.is_none()) {
+      anchor.T_AT = {quaternion(facing, "place_orientation"), vector3(place, "place")};
+      if (!anchor.T_AT.p.allFinite()) throw nb::value_error("place: not finite");
+    }
+    const auto given = checked<double>(covariance, "covariance", {6, 6});
+    anchor.covariance = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(given.data);
+    push_anchor(std::move(anchor));
+  }
   void finish() {
     done([&] { return system_->finish(); });
   }
@@ -128,6 +144,10 @@ class PySystem {
   }
 
  private:
+  static Quat quaternion(nb::handle wxyz, const char* name) {
+    const auto q = checked<double>(wxyz, name, {4});
+    return {q.data[0], q.data[1], q.data[2], q.data[3]};
+  }
   static Vec3 point_of(nb::handle point) { return point.is_none() ? Vec3(Vec3::Zero()) : vector3(point, "point"); }
   void push_anchor(Anchor anchor) {
     if (map_.is_none()) throw nb::value_error("anchors are for a map: System(map=...) has none");
@@ -278,6 +298,16 @@ void bind_system(nb::module_& m) {
       .def("push_height", &PySystem::push_height, "t"_a, "height"_a, "sigma"_a, "point"_a.none() = nb::none(),
            nb::sig("def push_height(self, t: int, height: float, sigma: float, point: numpy.ndarray | None = None) -> None"),
            "The same of a height above z = 0 of the building alone, m.")
+      .def(
+          "push_tag", &PySystem::push_tag, "t"_a, "id"_a, "position"_a, "orientation"_a, "covariance"_a,
+          "place"_a.none() = nb::none(), "place_orientation"_a.none() = nb::none(),
+          nb::sig("def push_tag(self, t: int, id: int, position: numpy.ndarray, orientation: numpy.ndarray, "
+                  "covariance: numpy.ndarray, place: numpy.ndarray | None = None, "
+                  "place_orientation: numpy.ndarray | None = None) -> None"),
+          "The same of a tag that a detector of yours saw: position (3,) in m and orientation (4,) w, x, y, z of the tag in B, "
+          "covariance (6, 6) of (position in B, rotation in the tag); where it hangs in the building, or None: then it is a landmark, "
+          "which says where the vehicle is when it is seen again, in this flight or in another. The tag's frame: origin in its "
+          "middle, x to the right and y upwards as a viewer of the upright tag sees it, z to him.")
       .def("finish", &PySystem::finish,
            "Processes all waiting events and ends; afterwards only results already waiting for poll() are left.")
       .def("poll", &PySystem::poll, "The Odometry of all images processed since the last call; empty with on_odometry.")

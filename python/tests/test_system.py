@@ -102,6 +102,11 @@ def test_positions_bring_the_map_into_the_building(flight):
         system.push_position(0, np.array([np.nan, 0, 0]), 0.1)
     with pytest.raises(ValueError, match="impossible"):
         system.push_height(0, 1.0, 0.0)
+    upright, sure = np.array([1.0, 0, 0, 0]), 1e-4 * np.eye(6)
+    with pytest.raises(ValueError, match="both or neither"):
+        system.push_tag(0, 3, np.ones(3), upright, sure, place=np.ones(3))
+    with pytest.raises(ValueError, match="impossible"):
+        system.push_tag(0, 3, np.ones(3), 2 * upright, sure)
     system.finish()
     flat.finish()
     updates = system.poll_map()

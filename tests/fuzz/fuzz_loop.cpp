@@ -10,6 +10,7 @@
 #include "fbvins/loop/binary_file.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_front.hpp"
+#include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/place_store.hpp"
 #include "fbvins/loop/vocabulary_training.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
@@ -22,6 +23,7 @@ namespace {
 
 constexpr std::size_t kMapHeader_bytes = 16, kMapFlagsAt = 12, kMapEnd_bytes = 24;
 constexpr std::size_t kMapVersionAt = 8, kMap1Header_bytes = 32, kMap1SizeAt = 16, kMap1ChecksumAt = 24;
+constexpr std::size_t kJournalHeader_bytes = 32, kJournalIdentityAt = 16, kBlockHead_bytes = 16;
 constexpr std::size_t kVocabularyHeader_bytes = 64, kNodesAt = 12, kVocabularyChecksumAt = 48, kNode_bytes = 48;
 
 Descriptor some_descriptor(Rng& rng) { return {{rng.next_u32(), rng.next_u32(), rng.next_u32(), rng.next_u32()}}; }
@@ -122,6 +124,43 @@ void fuzz_stored(const std::string& bytes) {
   require(written.ok() == !map->store->damage());
 }
 
+/// Of the map of many flights, all of which is new.
+std::string journal() {
+  const std::string bytes = map_of_many_flights();
+  PlaceMap map = *parse_map(std::as_bytes(std::span(bytes)), "map");
+  map.base = nullptr;
+  return *MapJournal().news(map);
+}
+
+/// Blocks that are whole, of a journal for a file of an empty map.
+std::string with_its_blocks(std::string bytes, const PlaceMap& empty) {
+  if (bytes.size() < kJournalHeader_bytes) return bytes;
+  overwrite(bytes, kJournalIdentityAt, empty.base->identity);
+  overwrite(bytes, kJournalIdentityAt + 8, checksum64(std::as_bytes(std::span(bytes)).first(kJournalIdentityAt + 8)));
+  for (std::size_t at = kJournalHeader_bytes; at + kBlockHead_bytes <= bytes.size();) {
+    const std::size_t begin = at + kBlockHead_bytes;
+    const auto count = std::min<std::size_t>(value_at<std::uint32_t>(bytes, at + 12), bytes.size() - begin);
+    overwrite(bytes, at + 12, static_cast<std::uint32_t>(count));
+    std::string summed(20, '\0');
+    overwrite(summed, 0, std::uint64_t{at});
+    overwrite(summed, 8, value_at<std::uint32_t>(bytes, at + 8));
+    overwrite(summed, 12, checksum64(std::as_bytes(std::span(bytes)).subspan(begin, count)));
+    overwrite(bytes, at, checksum_from(summed, 0));
+    at = begin + count;
+  }
+  return bytes;
+}
+
+void fuzz_journal(const std::string& bytes) {
+  const std::string file = serialise_map(PlaceMap{});
+  const auto empty = parse_map(std::as_bytes(std::span(file)), "map");
+  for (const std::string& journal : {bytes, with_its_blocks(bytes, *empty)}) {
+    const auto map = with_journal(*empty, *bytes_in_memory(journal), "map");
+    require_sentence(map);
+    require(!map || map_bytes(*map).ok());
+  }
+}
+
 std::string with_whole_nodes(std::string bytes) {
   if (bytes.size() < kVocabularyHeader_bytes) return bytes;
   const std::size_t nodes = (bytes.size() - kVocabularyHeader_bytes) / kNode_bytes;
@@ -134,11 +173,12 @@ std::string with_whole_nodes(std::string bytes) {
 }  // namespace
 
 std::vector<std::string> map_seeds() {
-  return {small_map(false), small_map(true), serialise_map(PlaceMap{}), map_of_many_flights(), map_of_version_1()};
+  return {small_map(false), small_map(true), serialise_map(PlaceMap{}), map_of_many_flights(), map_of_version_1(), journal()};
 }
 
 /// What is read is written as the same bytes again.
 void fuzz_map(std::string_view bytes) {
+  if (bytes.starts_with("FBVJOURN")) return fuzz_journal(std::string(bytes));
   require_sentence(parse_map(std::as_bytes(std::span(bytes)), "map"));
   const std::string whole = with_its_checksum(std::string(bytes));
   fuzz_stored(whole);

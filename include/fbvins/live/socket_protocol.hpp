@@ -17,7 +17,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 4,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 5,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -32,6 +32,7 @@ enum {
   FBVINS_SOCKET_GOODBYE = 4,   ///< either way
   FBVINS_SOCKET_POSITION = 5,  ///< sender to estimator, since version 1.1
   FBVINS_SOCKET_DEVICE = 6,    ///< sender to estimator, since version 1.4
+  FBVINS_SOCKET_TAG = 7,       ///< sender to estimator, since version 1.5
   FBVINS_SOCKET_WELCOME = 65,  ///< estimator to sender
   FBVINS_SOCKET_RELEASED = 66,
   FBVINS_SOCKET_STATUS = 67
@@ -163,6 +164,18 @@ typedef struct FbvinsSocketPosition {
   uint32_t measured;        ///< of a height alone only z and zz count
   uint32_t reserved;
 } FbvinsSocketPosition;
+
+/// A tag that a detector of the sender's saw (docs/maps.md, Anchors). Poses are a position in m and an orientation w, x, y, z;
+/// the tag's frame has its origin in its middle, x to the right and y upwards as a viewer of the upright tag sees it, z to him.
+typedef struct FbvinsSocketTag {
+  FbvinsSocketHeader header;
+  int64_t t_ns;  ///< of the cameras' clock
+  uint32_t id;
+  uint32_t has_place;        ///< 0: where it hangs is not known; it is a landmark of the map
+  double p_BT[3], q_BT[4];   ///< in the body
+  double covariance_BT[21];  ///< upper triangle by rows, of (dp in the body in m, dtheta in the tag in rad)
+  double p_AT[3], q_AT[4];   ///< in the building, where that is known
+} FbvinsSocketTag;
 
 /// What is known of the cameras' device, for `fbvins live --check` and for people. The newest one counts.
 typedef struct FbvinsSocketDevice {

@@ -32,6 +32,7 @@
 namespace fbvins {
 
 class LoopCloser;
+class MapJournal;
 
 struct MapOptions {
   std::string file = {};        ///< a map to relocalise in and continue; empty: a new one, in which M begins where W does
@@ -71,6 +72,9 @@ class LoopMap final : public Mapper {
   /// Bytes of the file that save() writes, all of them; may be called on the thread of process(), too. An error where a part of
   /// the loaded file is needed and cannot be read.
   Result<std::string> bytes() const;
+  /// To keep the map in flight, on the thread of process(): bytes for the journal beside the loaded file, of what is new since
+  /// the last call (src/fbvins/loop/map_journal.hpp); empty: nothing. `anew`: the last ones were lost. Errors as of bytes().
+  Result<std::string> news(bool anew);
   /// Replaces the file atomically, also the loaded one: there is never half of one. Errors as of bytes(), which it needs no
   /// memory for.
   Result<void> save(const std::string& path) const;
@@ -79,6 +83,7 @@ class LoopMap final : public Mapper {
   LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair);
 
   std::unique_ptr<LoopCloser> closer_;
+  std::unique_ptr<MapJournal> journal_;
   std::optional<CameraGroup> pair_;  ///< of a rig of more than two cameras
 };
 

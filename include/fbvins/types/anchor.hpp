@@ -7,6 +7,7 @@
 //   system.push(PositionAnchor{.t = t, .p_A = p_A, .covariance = 0.01 * Mat3::Identity(), .p_B = antenna_B});
 #pragma once
 
+#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
@@ -36,14 +37,20 @@ struct HeightAnchor {
   Vec3 p_B = Vec3::Zero();
 };
 
-/// A tag that was seen, and where it hangs.
+/// A tag that was seen, and where it hangs. Where that is not known the tag is a landmark of the map: it says where the vehicle
+/// is when it is seen again, in this flight or in another.
 struct TagAnchor {
   Time t = {};
   int id = 0;
-  Pose<A, Tag> T_AT = {};
+  Pose<A, Tag> T_AT = {};  ///< p is NaN: not known
   Pose<B, Tag> T_BT = {};
   Mat6 covariance = Mat6::Identity();  ///< of T_BT, as (dp in B, dtheta in the tag)
+
+  bool has_place() const { return !T_AT.p.array().isNaN().all(); }
 };
+
+/// TagAnchor::T_AT of a tag whose place is not known.
+inline Pose<A, Tag> unknown_place() { return {Quat::Identity(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN())}; }
 
 using Anchor = std::variant<PositionAnchor, HeightAnchor, TagAnchor>;
 

@@ -38,10 +38,13 @@ void read_tag(YamlReader& yaml, const YAML::Node& tag, TagSurvey& survey) {
   const double id = yaml.number(tag, "id");
   if (yaml.ok() && !(id >= 0 && id < kTagsOfFamily && id == std::floor(id)))
     yaml.complain(tag, "id", fmt::format("{:g} is not a whole number from 0 to {}", id, kTagsOfFamily - 1));
-  const std::vector<double> p = yaml.numbers(tag, "position_m", 3);
-  const Quat q = orientation_of(yaml, tag);
+  Pose<A, Tag> T_AT = unknown_place();
+  if (tag.size() > 1) {  // more than its number
+    const std::vector<double> p = yaml.numbers(tag, "position_m", 3);
+    T_AT = {orientation_of(yaml, tag), Vec3(p[0], p[1], p[2])};
+  }
   if (!yaml.ok()) return;
-  if (!survey.T_AT.emplace(static_cast<int>(id), Pose<A, Tag>(q, Vec3(p[0], p[1], p[2]))).second)
+  if (!survey.T_AT.emplace(static_cast<int>(id), T_AT).second)
     yaml.complain(tag, "id", fmt::format("tag {:g} is there twice", id));
 }
 
@@ -83,8 +86,10 @@ Result<TagSurvey> load_tags(const std::string& path) {
 std::string tags_to_yaml(const TagSurvey& survey) {
   std::string out = fmt::format("family: tag36h11\nsize_m: {}\ntags:\n", survey.size_m);
   for (const auto& [id, T] : survey.T_AT)
-    fmt::format_to(std::back_inserter(out), "  - {{id: {}, position_m: [{}, {}, {}], orientation_wxyz: [{}, {}, {}, {}]}}\n", id,
-                   T.p.x(), T.p.y(), T.p.z(), T.q.w(), T.q.x(), T.q.y(), T.q.z());
+    if (!TagAnchor{.T_AT = T}.has_place()) fmt::format_to(std::back_inserter(out), "  - {{id: {}}}\n", id);
+    else
+      fmt::format_to(std::back_inserter(out), "  - {{id: {}, position_m: [{}, {}, {}], orientation_wxyz: [{}, {}, {}, {}]}}\n",
+                     id, T.p.x(), T.p.y(), T.p.z(), T.q.w(), T.q.x(), T.q.y(), T.q.z());
   return out;
 }
 

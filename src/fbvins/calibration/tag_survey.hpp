@@ -8,6 +8,7 @@
 // tags:
 //   - {id: 3, position_m: [4.0, 1.2, 1.6], facing_deg: 180}                # upright on a wall
 //   - {id: 7, position_m: [2.0, 2.0, 0.0], orientation_wxyz: [1, 0, 0, 0]} # on the floor
+//   - {id: 9}                                                              # somewhere: a landmark of the map
 #pragma once
 
 #include <map>
@@ -20,7 +21,7 @@ namespace fbvins {
 
 struct TagSurvey {
   double size_m = 0.2;
-  std::map<int, Pose<A, Tag>> T_AT;  ///< by number
+  std::map<int, Pose<A, Tag>> T_AT;  ///< by number; TagAnchor::has_place() of which it is known
 };
 
 /// Of an upright tag on a wall, whose face looks in a direction of the horizontal plane, counter-clockwise from x.

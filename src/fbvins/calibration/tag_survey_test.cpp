@@ -13,11 +13,15 @@ constexpr const char* kHead = "family: tag36h11\nsize_m: 0.16\ntags:\n";
 TEST(TagSurvey, TagsOnWallsAndElsewhere) {
   const auto survey = parse_tags(std::string(kHead) +
                                      "  - {id: 3, position_m: [4, 1.2, 1.6], facing_deg: 180}\n"
-                                     "  - {id: 7, position_m: [2, 2, 0], orientation_wxyz: [1, 0, 0, 0]}\n",
+                                     "  - {id: 7, position_m: [2, 2, 0], orientation_wxyz: [1, 0, 0, 0]}\n"
+                                     "  - {id: 9}\n",
                                  "tags.yaml");
   ASSERT_TRUE(survey) << survey.error().message;
   EXPECT_EQ(survey->size_m, 0.16);
-  ASSERT_EQ(survey->T_AT.size(), 2u);
+  ASSERT_EQ(survey->T_AT.size(), 3u);
+  const auto has_place = [](const Pose<A, Tag>& T_AT) { return TagAnchor{.T_AT = T_AT}.has_place(); };
+  EXPECT_TRUE(has_place(survey->T_AT.at(3)));
+  EXPECT_FALSE(has_place(survey->T_AT.at(9)));
   const Pose<A, Tag>& wall = survey->T_AT.at(3);
   EXPECT_LT((wall.q * Vec3::UnitZ() + Vec3::UnitX()).norm(), 1e-12) << "its face looks along -x";
   EXPECT_LT((wall.q * Vec3::UnitY() - Vec3::UnitZ()).norm(), 1e-12) << "upright";
@@ -25,6 +29,8 @@ TEST(TagSurvey, TagsOnWallsAndElsewhere) {
   const auto again = parse_tags(tags_to_yaml(*survey), "tags.yaml");
   ASSERT_TRUE(again) << again.error().message;
   for (const auto& [id, T] : survey->T_AT) {
+    ASSERT_EQ(has_place(again->T_AT.at(id)), has_place(T));
+    if (!has_place(T)) continue;
     EXPECT_LT((again->T_AT.at(id).p - T.p).norm(), 1e-12);
     EXPECT_LT(so3_log(again->T_AT.at(id).q.conjugate() * T.q).norm(), 1e-9);
   }

@@ -60,6 +60,18 @@ bool lock(const FileDescriptor& file) {
   return ::fstat(file.number(), &state) != 0 || state.st_nlink > 0;
 }
 
+/// Returns errno of what went wrong, or 0.
+int put_at(const FileDescriptor& file, std::uint64_t offset, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::pwrite(file.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return n < 0 ? errno : ENOSPC;
+    offset += static_cast<std::uint64_t>(n);
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return 0;
+}
+
 std::string next_temporary(const std::string& path) {
   static std::atomic<unsigned> made{0};
   return fmt::format("{}.{}-{}{}", path, ::getpid(), made++, kEnding);
@@ -93,14 +105,7 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::put(std::uint64_t offset, std::string_view bytes) {
-  while (!bytes.empty() && failure_ == 0) {
-    const ssize_t n = ::pwrite(file_.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) failure_ = n < 0 ? errno : ENOSPC;
-    if (n <= 0) return;
-    offset += static_cast<std::uint64_t>(n);
-    bytes.remove_prefix(static_cast<std::size_t>(n));
-  }
+  if (failure_ == 0) failure_ = put_at(file_, offset, bytes);
 }
 
 void AtomicFile::flush() {
@@ -139,6 +144,15 @@ Result<void> write_file_atomically(const std::string& path, std::string_view byt
   if (!file) return file.error();
   file->write(bytes);
   return file->commit();
+}
+
+Result<void> append_to_file(const std::string& path, std::string_view bytes) {
+  const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat state {};
+  if (!file || ::fstat(file.number(), &state) != 0) return unwritable(path, errno);
+  int failure = put_at(file, static_cast<std::uint64_t>(state.st_size), bytes);
+  if (failure == 0 && ::fsync(file.number()) != 0) failure = errno;
+  return failure == 0 ? Result<void>() : unwritable(path, failure);
 }
 
 Result<std::string> set_aside(const std::string& path) {

@@ -56,7 +56,9 @@ class AtomicFile {
 
 /// All of a file at once.
 Result<void> write_file_atomically(const std::string& path, std::string_view bytes);
-/// A function that does this, as tests replace it.
+/// To the end of a file that exists, and to the disk. Not atomic: a kill leaves a part of the bytes, which the reader must know.
+Result<void> append_to_file(const std::string& path, std::string_view bytes);
+/// A function that writes a file, as tests replace it.
 using WriteFile = std::function<Result<void>(const std::string& path, std::string_view bytes)>;
 
 /// Renames a file that cannot be used to FILE.bad, FILE.bad2 ..., so that a new one can take its place and nothing is lost.

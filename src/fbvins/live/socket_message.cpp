@@ -31,7 +31,7 @@ static_assert(sizeof(FbvinsSocketHello) == kThirdHello_bytes + 8 * sizeof(Fbvins
 static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
-static_assert(sizeof(FbvinsSocketPosition) == 120 && sizeof(FbvinsSocketDevice) == 2048);
+static_assert(sizeof(FbvinsSocketPosition) == 120 && sizeof(FbvinsSocketTag) == 304 && sizeof(FbvinsSocketDevice) == 2048);
 static_assert(sizeof(FbvinsSocketImu) <= FBVINS_SOCKET_LARGEST_MESSAGE);
 
 Error malformed(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
@@ -186,6 +186,26 @@ Result<SocketMessage> parse_position(std::span<const std::byte> bytes) {
   return SocketMessage(impossible(anchor).empty() ? SocketPosition{std::move(anchor)} : SocketPosition{});
 }
 
+template <class From, class To>
+Pose<From, To> pose_of(const double (&p)[3], const double (&q)[4]) {
+  return {Quat(q[0], q[1], q[2], q[3]), Vec3(p)};
+}
+
+Result<SocketMessage> parse_tag(std::span<const std::byte> bytes) {
+  const auto tag = read<FbvinsSocketTag>(bytes, "tag");
+  if (!tag) return tag.error();
+  if (!is_stamp(tag->t_ns)) return malformed(fmt::format("tag: stamp {} ns", tag->t_ns));
+  TagAnchor out{.t = {tag->t_ns},
+                .id = static_cast<int>(tag->id & 0x7fffffffu),
+                .T_AT = tag->has_place != 0 ? pose_of<A, Tag>(tag->p_AT, tag->q_AT) : unknown_place(),
+                .T_BT = pose_of<B, Tag>(tag->p_BT, tag->q_BT)};
+  for (int i = 0, n = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) out.covariance(i, j) = out.covariance(j, i) = tag->covariance_BT[n++];
+  const Anchor anchor = out;
+  const bool usable = impossible(anchor).empty() && out.has_place() == (tag->has_place != 0);
+  return SocketMessage(usable ? SocketPosition{anchor} : SocketPosition{});
+}
+
 Result<SocketMessage> parse_device(std::span<const std::byte> bytes) {
   const auto device = read<FbvinsSocketDevice>(bytes, "device");
   if (!device) return device.error();
@@ -213,6 +233,7 @@ Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes) {
     case FBVINS_SOCKET_FRAME: return parse_frame(bytes);
     case FBVINS_SOCKET_GOODBYE: return parse_goodbye(bytes);
     case FBVINS_SOCKET_POSITION: return parse_position(bytes);
+    case FBVINS_SOCKET_TAG: return parse_tag(bytes);
     case FBVINS_SOCKET_DEVICE: return parse_device(bytes);
     default: return SocketMessage(SocketUnknown{header->type});
   }

@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.4 of the protocol, this program 1.4");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.5 of the protocol, this program 1.5");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -109,6 +109,37 @@ TEST(SocketMessage, CalibrationsThatCannotBeAreRefused) {
   EXPECT_EQ(with([](auto& r) { r.right = r.left; }), "calibration: the two cameras are 0 m apart, not between 1 mm and 10 m");
   EXPECT_EQ(with([](auto& r) { r.imu_rate_hz = 0; }), "calibration: a noise density or a rate is not positive");
   EXPECT_EQ(with([](auto& r) { r.time_offset_s = kNan; }), "calibration: the time offset is more than 10 s");
+}
+
+TEST(SocketMessage, TagsWithAndWithoutAPlace) {
+  FbvinsSocketTag tag{};
+  tag.header = {FBVINS_SOCKET_TAG, sizeof(tag)};
+  tag.t_ns = 77, tag.id = 5;
+  tag.p_BT[0] = 2, tag.q_BT[0] = 1;
+  for (int i = 0, n = 0; i < 6; n += 6 - i++) tag.covariance_BT[n] = 0.01 * (i + 1);
+  tag.covariance_BT[1] = 0.002;
+  const auto anchor_of = [&] {
+    const auto message = parse_socket_message(bytes_of(tag));
+    EXPECT_TRUE(message);
+    return std::get<SocketPosition>(*message).anchor;
+  };
+  const auto landmark = std::get<TagAnchor>(*anchor_of());
+  EXPECT_EQ(landmark.t, Time{77});
+  EXPECT_EQ(landmark.id, 5);
+  EXPECT_FALSE(landmark.has_place());
+  EXPECT_EQ(landmark.T_BT.p, Vec3(2, 0, 0));
+  EXPECT_EQ(landmark.covariance(1, 0), 0.002);
+  EXPECT_EQ(landmark.covariance(5, 5), 0.06);
+  tag.has_place = 1;
+  EXPECT_FALSE(anchor_of()) << "a place without an orientation";
+  tag.p_AT[1] = 3, tag.q_AT[0] = 1;
+  EXPECT_EQ(std::get<TagAnchor>(*anchor_of()).T_AT.p, Vec3(0, 3, 0));
+  for (double& p : tag.p_AT) p = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(anchor_of()) << "no landmark by accident";
+  tag.has_place = 0, tag.covariance_BT[0] = -1;
+  EXPECT_FALSE(anchor_of());
+  tag.t_ns = -1;
+  EXPECT_EQ(refusal(bytes_of(tag)), "tag: stamp -1 ns");
 }
 
 TEST(SocketMessage, PositionsAndHeights) {

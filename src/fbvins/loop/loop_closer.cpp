@@ -187,6 +187,7 @@ MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
   update.stats.verify_ms = timer.lap_ms();
   update.stats.candidates = static_cast<int>(candidates.size());
   add(std::move(query), keyframe.imu, found, update);
+  take_tags(keyframe, update);
   take_anchors(keyframe, update);
   if (optimisation_due()) optimise(update);
   while (const auto id = thinning_.next(map_)) take_out(*id);
@@ -222,22 +223,26 @@ std::vector<LoopCloser::Proposal> LoopCloser::look_at(const MapKeyframe& query, 
   return proposals;
 }
 
+/// What a place or a tag that was seen before says of the body, unless it contradicts the odometry.
+bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
+  // The error that different roll and pitch cause through the lever arm is not drift.
+  double tilt_variance = kTiltSigma_rad * kTiltSigma_rad;
+  if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
+  seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
+  if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
+  frame_.update(seen);
+  return true;
+}
+
 void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update,
                        std::vector<MapEdge>& found) {
-  const double gate = options_.gate_sigma * options_.gate_sigma;
   for (const Proposal& proposal : proposals) {
     MapKeyframe& k = *map_.find(proposal.candidate);
-    MeasuredPose seen = measured_pose(k, proposal.edge);
-    // The error that different roll and pitch cause through the lever arm is not drift.
-    double tilt_variance = kTiltSigma_rad * kTiltSigma_rad;
-    if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
-    seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
-    if (frame_.mahalanobis2(seen) > gate) {
+    if (!take(k, measured_pose(k, proposal.edge))) {
       ++update.stats.refused;
       join_.note_refused(session_.number, 1);
       continue;
     }
-    frame_.update(seen);
     found.push_back(proposal.edge);
     ++update.stats.accepted;
     ++k.loops_ending_here;
@@ -245,14 +250,18 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
   query.T_MB = frame_.T_MG() * query.T_GB;
 }
 
+void LoopCloser::found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen) {
+  frame_.reset(T_MG, kFoundSigma_m, kFoundSigma_rad);
+  frame_.update(seen);
+  join_session(frame_.T_MG());
+}
+
 void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found) {
   for (const Proposal& proposal : proposals) {
     const MeasuredPose seen = measured_pose(*map_.find(proposal.candidate), proposal.edge);
     const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
     if (!T_MG) continue;
-    frame_.reset(*T_MG, kFoundSigma_m, kFoundSigma_rad);
-    frame_.update(seen);
-    join_session(frame_.T_MG());
+    found_at(*T_MG, seen);
     query.T_MB = frame_.T_MG() * query.T_GB;
     query.placed = true;
     found.push_back(proposal.edge);

@@ -95,11 +95,16 @@ class LoopCloser final : public Mapper {
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
   std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
   void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
+  bool take(const MapKeyframe& k, MeasuredPose seen);
+  void found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
   void join_session(const Pose<M, G>& T_MG);
   std::shared_ptr<const Preintegration> readings_since_newest(Time t, const KeyframeImu& imu) const;
   void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
   void take_anchors(const Keyframe& keyframe, MapUpdate& update);
+  void take_tags(const Keyframe& keyframe, MapUpdate& update);
+  std::optional<MapTag> tag_of_newest(const TagAnchor& anchor) const;
+  bool tie(const MapTag& before, const MapTag& now, MapUpdate& update);
   std::optional<MapAnchor> attached(const Anchor& anchor) const;
   AnchoredPose anchored_pose(const MapAnchor& anchor) const;
   std::vector<AnchoredPose> anchored_poses() const;

@@ -36,10 +36,13 @@ std::optional<MapAnchor> LoopCloser::attached(const Anchor& anchor) const {
 /// All anchors are kept, also those that contradict the present estimate: the graph finds which of them are wrong.
 void LoopCloser::take_anchors(const Keyframe& keyframe, MapUpdate& update) {
   const double gate = options_.gate_sigma * options_.gate_sigma;
-  const std::size_t count = keyframe.anchors.size(), most = std::min(count, kMostOfAKeyframe);
+  std::vector<const Anchor*> anchors;
+  for (const Anchor& anchor : keyframe.anchors)
+    if (const auto* tag = std::get_if<TagAnchor>(&anchor); tag == nullptr || tag->has_place()) anchors.push_back(&anchor);
+  const std::size_t count = anchors.size(), most = std::min(count, kMostOfAKeyframe);
   bool taken = false;
   for (std::size_t i = 0; i < most; ++i) {
-    const std::optional<MapAnchor> anchor = attached(keyframe.anchors[i * count / most]);
+    const std::optional<MapAnchor> anchor = attached(*anchors[i * count / most]);
     if (!anchor) {
       ++update.stats.anchors_refused;
       continue;

@@ -7,6 +7,7 @@
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_front.hpp"
+#include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/place_store.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 
@@ -46,7 +47,8 @@ Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const Map
   return std::unique_ptr<LoopMap>(new LoopMap(std::move(closer), pair));
 }
 
-LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair) : closer_(std::move(closer)), pair_(pair) {}
+LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair)
+    : closer_(std::move(closer)), journal_(std::make_unique<MapJournal>()), pair_(pair) {}
 LoopMap::~LoopMap() = default;
 
 MapUpdate LoopMap::process(const Keyframe& keyframe) {
@@ -57,6 +59,7 @@ MapUpdate LoopMap::process(const Keyframe& keyframe) {
 }
 void LoopMap::take_over(std::unique_ptr<LoopMap> other) {
   closer_ = std::move(other->closer_);
+  journal_ = std::move(other->journal_);
   pair_ = other->pair_;
 }
 PoseGraphReport LoopMap::finish() { return closer_->finish(); }
@@ -67,6 +70,11 @@ std::map<std::uint32_t, std::string> LoopMap::not_joined() const { return closer
 Result<std::string> LoopMap::bytes() const {
   const std::optional<PlaceMap> reduced = closer_->reduced();
   return map_bytes(reduced ? *reduced : closer_->map());
+}
+Result<std::string> LoopMap::news(bool anew) {
+  if (anew) journal_->begin_anew();
+  const std::optional<PlaceMap> reduced = closer_->reduced();
+  return journal_->news(reduced ? *reduced : closer_->map());
 }
 Result<void> LoopMap::save(const std::string& path) const {
   const std::optional<PlaceMap> reduced = closer_->reduced();

@@ -9,6 +9,7 @@
 
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/loop/map_front.hpp"
+#include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/map_records.hpp"
 #include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/map_writer.hpp"
@@ -41,13 +42,14 @@ Result<PlaceMap> parse_version_1(std::string_view bytes, const std::string& name
     if (in.ok()) map.add(std::move(k));
   }
   get_rest(in, edges, flags, map);
+  get_missed(in, flags, map);
   if (!in.ok() || !in.at_end()) return damaged_map(name, "its content makes no sense");
   remember_sessions(map);
   return map;
 }
 
 /// Of any version; places of the newest one stay in the file.
-Result<PlaceMap> opened(std::shared_ptr<ByteSource> file, const std::string& name, std::uint64_t most_bytes) {
+Result<PlaceMap> parsed(std::shared_ptr<ByteSource> file, const std::string& name, std::uint64_t most_bytes) {
   const std::string header = file->read(0, kMapHeaderBytes);
   if (header.size() < kMapHeaderBytes) return damaged_map(name, "too short");
   if (!header.starts_with(kMapName)) return Error{ErrorCode::unsupported, fmt::format("{}: not a map", name)};
@@ -56,6 +58,12 @@ Result<PlaceMap> opened(std::shared_ptr<ByteSource> file, const std::string& nam
   if (version == kMapVersion) return read_front(std::move(file), name, most_bytes);
   return Error{ErrorCode::unsupported,
                fmt::format("{}: map of version {}, this program reads 1 and {}", name, version, kMapVersion)};
+}
+
+Result<PlaceMap> opened(const std::shared_ptr<ByteSource>& file, const std::string& name, std::uint64_t most_bytes) {
+  Result<PlaceMap> map = parsed(file, name, most_bytes);
+  if (map) map->base = base_of(*map, *file);
+  return map;
 }
 
 }  // namespace
@@ -80,16 +88,29 @@ Result<void> save_map(const PlaceMap& map, const std::string& path) {
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();
   if (Result<void> written = write_map(map, [&](std::string_view piece) { file->write(piece); }); !written) return written;
-  return file->commit();
+  if (Result<void> done = file->commit(); !done) return done;
+  remove_journal(path);
+  return {};
+}
+
+Result<void> write_map_bytes(const std::string& path, std::string_view bytes) {
+  if (!bytes.starts_with(kMapName)) return write_journal(path, bytes);
+  if (Result<void> done = write_file_atomically(path, bytes); !done) return done;
+  remove_journal(path);
+  return {};
 }
 
 Result<PlaceMap> open_map(const std::string& path, std::uint64_t most_bytes) {
   auto file = open_bytes(path);
   if (!file) return file.error();
-  return opened(*std::move(file), path, most_bytes);
+  return with_journal(opened(*file, path, most_bytes), path);
 }
 
-Result<PlaceMap> load_map(const std::string& path) { return read_whole(open_map(path, 0), path); }
+Result<PlaceMap> load_map(const std::string& path) {
+  auto file = open_bytes(path);
+  if (!file) return file.error();
+  return with_journal(read_whole(opened(*file, path, 0), path), path);
+}
 
 std::string map_as_ply(const PlaceMap& map) {
   constexpr float kMaxRelativeSigma = 0.1f;  // of a depth worth looking at

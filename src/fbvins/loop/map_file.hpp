@@ -26,8 +26,11 @@ std::string serialise_map(const PlaceMap& map);
 /// `name` is for messages only. Damaged bytes are an error that says what is wrong.
 Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& name);
 
+/// The journal beside the file, if there is one, is removed: the map has what is in it.
 Result<void> save_map(const PlaceMap& map, const std::string& path);
-/// All of it into memory, and checked.
+/// The same of bytes: those of a map replace the file, those of MapJournal::news() go into the journal beside it.
+Result<void> write_map_bytes(const std::string& path, std::string_view bytes);
+/// With what the journal beside the file adds, if there is one. All of it into memory, and checked.
 Result<PlaceMap> load_map(const std::string& path);
 /// Poses and edges; places and words are read, and checked, when they are asked for, and of places as many stay in memory as fit
 /// into `most_bytes`. The file may be replaced meanwhile (save_map), not written to. Of version 1: all of it into memory.

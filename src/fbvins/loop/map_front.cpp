@@ -79,6 +79,7 @@ Result<PlaceMap> read_front(std::shared_ptr<ByteSource> file, const std::string&
   map.T_BC0 = in.pose<Pose<B, C0>>();
   const std::uint64_t places_end = get_keyframes(in, keyframes, map, places);
   get_rest(in, edges, flags, map);
+  get_missed(in, flags, map);
   if (in.ok() && map.vocabulary != 0) in.check(get_lists(in, places_end, words) == end.front_at);
   else in.check(places_end == end.front_at);
   if (!in.ok() || !in.at_end()) return damaged_map(name, "its content makes no sense");

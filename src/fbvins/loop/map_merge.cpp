@@ -145,6 +145,10 @@ std::map<KeyframeId, KeyframeId> append(PlaceMap& map, const PlaceMap& second, c
       a.keyframe = renamed.at(a.keyframe);
       map.anchors.push_back(std::move(a));
     }
+  for (MapTag t : second.tags) {
+    t.keyframe = renamed.at(t.keyframe);
+    map.tags.push_back(std::move(t));
+  }
   return renamed;
 }
 

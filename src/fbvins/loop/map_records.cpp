@@ -66,6 +66,23 @@ MapAnchor get_anchor(BytesIn& in) {
   return a;
 }
 
+void put_tag(BytesOut& out, const MapTag& t) {
+  out.put(t.keyframe.value);
+  out.put(static_cast<std::int32_t>(t.id));
+  out.put(t.T_BT);
+  put_information(out, t.covariance);
+}
+
+MapTag get_tag(BytesIn& in) {
+  MapTag t;
+  t.keyframe.value = in.get<std::int64_t>();
+  t.id = in.get<std::int32_t>();
+  t.T_BT = in.pose<Pose<B, Tag>>();
+  t.covariance = get_information(in);
+  in.check(t.covariance.allFinite() && Eigen::LLT<Mat6>(t.covariance).info() == Eigen::Success);
+  return t;
+}
+
 std::string get_name(BytesIn& in) {
   const auto n = in.get<std::uint32_t>();
   in.check(n > 0 && n <= kLongestName && n <= in.left());
@@ -84,7 +101,7 @@ std::vector<MapSession> remembered(const PlaceMap& map) {
   return out;
 }
 
-void put_memory(BytesOut& out, const PlaceMap& map, const std::vector<MapSession>& sessions) {
+void put_sessions(BytesOut& out, const std::vector<MapSession>& sessions) {
   out.put(static_cast<std::uint32_t>(sessions.size()));
   for (const MapSession& s : sessions) {
     out.put(s.number);
@@ -93,11 +110,9 @@ void put_memory(BytesOut& out, const PlaceMap& map, const std::vector<MapSession
     out.put(static_cast<std::int32_t>(s.keyframes));
     out.put(static_cast<std::int32_t>(s.loops));
   }
-  for (const MapKeyframe& k : map.keyframes())
-    if (k.placed) out.put(static_cast<std::int32_t>(k.missed));
 }
 
-void get_memory(BytesIn& in, PlaceMap& map) {
+void get_sessions(BytesIn& in, PlaceMap& map) {
   const auto sessions = in.get<std::uint32_t>();
   in.check(sessions > 1);
   for (std::uint32_t i = 0; i < sessions && in.ok(); ++i) {
@@ -110,7 +125,6 @@ void get_memory(BytesIn& in, PlaceMap& map) {
     in.check(map.sessions.empty() || s.number > map.sessions.back().number);
     map.sessions.push_back(s);
   }
-  for (MapKeyframe& k : map.keyframes()) k.missed = in.get<std::int32_t>();
 }
 
 }  // namespace
@@ -191,6 +205,8 @@ MapRest rest_of(const PlaceMap& map) {
   rest.name = map.name.substr(0, kLongestName);
   for (const MapAnchor& a : map.anchors)
     if (kept.count(a.keyframe) > 0) rest.anchors.push_back(&a);
+  for (const MapTag& t : map.tags)
+    if (kept.count(t.keyframe) > 0) rest.tags.push_back(&t);
   rest.sessions = remembered(map);
   if (rest.sessions.size() == 1) rest.sessions.clear();
   return rest;
@@ -198,10 +214,10 @@ MapRest rest_of(const PlaceMap& map) {
 
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest) {
   return (map.boosted ? kMapBoosted : 0) | (rest.name.empty() ? 0 : kMapNamed) | (rest.anchors.empty() ? 0 : kMapAnchors) |
-         (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory);
+         (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory) | (rest.tags.empty() ? 0 : kMapTags);
 }
 
-void put_rest(BytesOut& out, const PlaceMap& map, const MapRest& rest) {
+void put_rest(BytesOut& out, const MapRest& rest) {
   for (const MapEdge* e : rest.edges) put_edge(out, *e);
   if (!rest.name.empty()) {
     out.put(static_cast<std::uint32_t>(rest.name.size()));
@@ -211,7 +227,15 @@ void put_rest(BytesOut& out, const PlaceMap& map, const MapRest& rest) {
     out.put(static_cast<std::uint32_t>(rest.anchors.size()));
     for (const MapAnchor* a : rest.anchors) put_anchor(out, *a);
   }
-  if (!rest.sessions.empty()) put_memory(out, map, rest.sessions);
+  if (!rest.sessions.empty()) put_sessions(out, rest.sessions);
+  if (rest.tags.empty()) return;
+  out.put(static_cast<std::uint32_t>(rest.tags.size()));
+  for (const MapTag* t : rest.tags) put_tag(out, *t);
+}
+
+void put_missed(BytesOut& out, const PlaceMap& map) {
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.placed) out.put(static_cast<std::int32_t>(k.missed));
 }
 
 void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& map) {
@@ -228,7 +252,19 @@ void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& m
     in.check(map.find(a.keyframe) != nullptr);
     if (in.ok()) map.anchors.push_back(a);
   }
-  if (in.ok() && (flags & kMapMemory) != 0) get_memory(in, map);
+  if (in.ok() && (flags & kMapMemory) != 0) get_sessions(in, map);
+  const std::uint32_t tags = in.ok() && (flags & kMapTags) != 0 ? in.get<std::uint32_t>() : 0;
+  in.check(tags > 0 || (flags & kMapTags) == 0);
+  for (std::uint32_t i = 0; i < tags && in.ok(); ++i) {
+    MapTag t = get_tag(in);
+    in.check(map.find(t.keyframe) != nullptr);
+    if (in.ok()) map.tags.push_back(t);
+  }
+}
+
+void get_missed(BytesIn& in, std::uint32_t flags, PlaceMap& map) {
+  if (!in.ok() || (flags & kMapMemory) == 0) return;
+  for (MapKeyframe& k : map.keyframes()) k.missed = in.get<std::int32_t>();
 }
 
 }  // namespace fbvins

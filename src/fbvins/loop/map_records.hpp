@@ -25,9 +25,9 @@ std::uint64_t map_checksum(std::string_view bytes);
 Error damaged_map(const std::string& name, std::string_view what);
 
 /// Flags: descriptors are boosted; a name follows the edges, and anchors follow it; M is their frame; what is remembered of
-/// sessions comes then.
-inline constexpr std::uint32_t kMapBoosted = 1, kMapNamed = 2, kMapAnchors = 4, kMapAnchored = 8, kMapMemory = 16;
-inline constexpr std::uint32_t kMapFlags = kMapBoosted | kMapNamed | kMapAnchors | kMapAnchored | kMapMemory;
+/// sessions comes then, and tags that are landmarks.
+inline constexpr std::uint32_t kMapBoosted = 1, kMapNamed = 2, kMapAnchors = 4, kMapAnchored = 8, kMapMemory = 16, kMapTags = 32;
+inline constexpr std::uint32_t kMapFlags = kMapBoosted | kMapNamed | kMapAnchors | kMapAnchored | kMapMemory | kMapTags;
 
 /// Bytes of a feature with its descriptor.
 inline constexpr std::size_t kFeatureBytes = sizeof(PlaceFeature) + sizeof(Descriptor);
@@ -47,12 +47,16 @@ struct MapRest {
   std::vector<const MapEdge*> edges;
   std::string name;
   std::vector<const MapAnchor*> anchors;
+  std::vector<const MapTag*> tags;
   std::vector<MapSession> sessions;  ///< none where there is one only, which its keyframes show
 };
 MapRest rest_of(const PlaceMap& map);
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest);
-void put_rest(BytesOut& out, const PlaceMap& map, const MapRest& rest);
+void put_rest(BytesOut& out, const MapRest& rest);
 /// Into a map that has its keyframes.
 void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& map);
+/// MapKeyframe::missed of each, where sessions are remembered.
+void put_missed(BytesOut& out, const PlaceMap& map);
+void get_missed(BytesIn& in, std::uint32_t flags, PlaceMap& map);
 
 }  // namespace fbvins

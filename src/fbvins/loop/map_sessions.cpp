@@ -50,6 +50,7 @@ void take_out_sessions(PlaceMap& map, const std::set<std::uint32_t>& numbers) {
   const auto gone = [&](KeyframeId id) { return numbers.count(map.find(id)->session) > 0; };
   std::erase_if(map.edges, [&](const MapEdge& e) { return gone(e.from) || gone(e.to); });
   std::erase_if(map.anchors, [&](const MapAnchor& a) { return gone(a.keyframe); });
+  std::erase_if(map.tags, [&](const MapTag& t) { return gone(t.keyframe); });
   std::erase_if(map.keyframes(), [&](const MapKeyframe& k) { return numbers.count(k.session) > 0; });
   std::erase_if(map.sessions, [&](const MapSession& s) { return numbers.count(s.number) > 0; });
 }

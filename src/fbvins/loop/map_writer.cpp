@@ -76,25 +76,6 @@ class CountedOutput {
   std::uint64_t written_ = 0;
 };
 
-/// A place with its words, without them where no vocabulary is known.
-struct PlaceRecord {
-  std::string bytes;
-  std::size_t features = 0, words = 0;
-};
-
-Result<PlaceRecord> record_of(const PlaceMap& map, const MapKeyframe& k) {
-  if (k.stored >= 0) {
-    const StoredPlace& stored = map.store->at(static_cast<std::size_t>(k.stored));
-    Result<std::string> bytes = map.store->bytes_of(static_cast<std::size_t>(k.stored));
-    if (!bytes) return bytes.error();
-    return PlaceRecord{*std::move(bytes), stored.features, stored.words};
-  }
-  BytesOut place;
-  put_place(place, k.place);
-  if (map.vocabulary != 0) put_words(place, k.place.words);
-  return PlaceRecord{place.take(), k.place.size(), map.vocabulary != 0 ? k.place.words.size() : 0};
-}
-
 /// The places go to `out`, what the front says of keyframes is the result.
 Result<std::string> put_places(const PlaceMap& map, CountedOutput& out) {
   BytesOut keyframes;
@@ -133,6 +114,19 @@ std::string put_lists(const PlaceMap& map, CountedOutput& out) {
 
 }  // namespace
 
+Result<PlaceRecord> record_of(const PlaceMap& map, const MapKeyframe& k) {
+  if (k.stored >= 0) {
+    const StoredPlace& stored = map.store->at(static_cast<std::size_t>(k.stored));
+    Result<std::string> bytes = map.store->bytes_of(static_cast<std::size_t>(k.stored));
+    if (!bytes) return bytes.error();
+    return PlaceRecord{*std::move(bytes), stored.features, stored.words};
+  }
+  BytesOut place;
+  put_place(place, k.place);
+  if (map.vocabulary != 0) put_words(place, k.place.words);
+  return PlaceRecord{place.take(), k.place.size(), map.vocabulary != 0 ? k.place.words.size() : 0};
+}
+
 bool lists_agree(const PlaceMap& map, const std::vector<StoredWord>& words) {
   WordLists lists(map);
   for (const StoredWord& w : words) {
@@ -162,7 +156,8 @@ Result<void> write_map(const PlaceMap& map, const std::function<void(std::string
   front.put(map.vocabulary);
   front.put(map.T_BC0);
   front.raw(keyframes->data(), keyframes->size());
-  put_rest(front, map, rest);
+  put_rest(front, rest);
+  if ((flags & kMapMemory) != 0) put_missed(front, map);
   front.raw(words.data(), words.size());
   const std::string bytes = front.take();
   out.put(bytes);

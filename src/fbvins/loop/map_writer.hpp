@@ -19,6 +19,13 @@ namespace fbvins {
 /// its places are in memory or not.
 Result<void> write_map(const PlaceMap& map, const std::function<void(std::string_view)>& write);
 
+/// A place with its words, without them where no vocabulary is known.
+struct PlaceRecord {
+  std::string bytes;
+  std::size_t features = 0, words = 0;
+};
+Result<PlaceRecord> record_of(const PlaceMap& map, const MapKeyframe& k);
+
 /// Whether a file whose keyframes are those of `map` says the same of the words.
 bool lists_agree(const PlaceMap& map, const std::vector<StoredWord>& words);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "fbvins/imu/preintegration.hpp"
+#include "fbvins/loop/map_tags.hpp"
 #include "fbvins/loop/place_store.hpp"
 
 namespace fbvins {
@@ -123,7 +124,10 @@ void PlaceMap::remove(KeyframeId id) {
   for (MapAnchor& a : anchors)
     if (a.keyframe == id && bridge != nullptr)
       a = {bridge->from, carried(a.measured, bridge->T_from_to, bridge->information.inverse())};
+  for (MapTag& t : tags)
+    if (t.keyframe == id && bridge != nullptr) t = carried(t, bridge->from, bridge->T_from_to, bridge->information.inverse());
   std::erase_if(anchors, [&](const MapAnchor& a) { return a.keyframe == id; });
+  std::erase_if(tags, [&](const MapTag& t) { return t.keyframe == id; });
   std::erase_if(edges, [&](const MapEdge& e) { return e.from == id || e.to == id; });
   edges.insert(edges.end(), added.begin(), added.end());
   keyframes_.erase(keyframes_.begin() + (gone - keyframes_.data()));
@@ -231,6 +235,7 @@ void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0) {
     e.imu = nullptr;
   }
   for (MapAnchor& a : map.anchors) a.measured = carried(a.measured, T_new_old, Mat6::Zero());
+  for (MapTag& t : map.tags) t = carried(t, t.keyframe, T_new_old, Mat6::Zero());
 }
 
 }  // namespace fbvins

@@ -64,12 +64,33 @@ struct MapAnchor {
   PartialPose measured;
 };
 
+/// A tag whose place in the building is not known, as a keyframe shows it.
+struct MapTag {
+  KeyframeId keyframe;
+  int id = 0;
+  Pose<B, Tag> T_BT;
+  Mat6 covariance = Mat6::Identity();  ///< of (dp in B, dtheta in the tag)
+};
+
 /// What the map remembers of a flight, or of a part of one between two restarts, though its keyframes may be gone.
 struct MapSession {
   std::uint32_t number = 0;
   Time began, ended;  ///< stamps of its first and last keyframe, of its sensors' clock
   int keyframes = 0;  ///< that it brought
   int loops = 0;      ///< that it closed with other sessions
+};
+
+/// What a map's file says of it, which a journal beside the file builds on.
+struct MapBase {
+  struct Keyframe {
+    KeyframeId id;
+    Pose<M, B> T_MB;
+    int loops_ending_here;
+  };
+  std::uint64_t identity = 0;  ///< of the file's bytes
+  Pose<B, C0> T_BC0;
+  std::vector<Keyframe> keyframes;
+  std::size_t edges = 0;
 };
 
 class PlaceMap {
@@ -112,14 +133,16 @@ class PlaceMap {
 
   std::vector<MapEdge> edges;
   std::vector<MapAnchor> anchors;
-  std::vector<MapSession> sessions;   ///< in order of number
-  bool anchored = false;              ///< M is the frame A of the anchors
-  Pose<B, C0> T_BC0;                  ///< of the camera that saw the places
-  double gravity_mps2 = 9.81;         ///< of the readings on its edges
-  bool boosted = false;               ///< descriptors are boosted ones, which compare with such only
-  std::string name;                   ///< for people; empty: none
-  std::uint64_t vocabulary = 0;       ///< Vocabulary::fingerprint() of the words of its places; 0: they have none
-  std::shared_ptr<PlaceStore> store;  ///< file with the places of keyframes that have a slot there; shared by copies
+  std::vector<MapTag> tags;
+  std::vector<MapSession> sessions;     ///< in order of number
+  bool anchored = false;                ///< M is the frame A of the anchors
+  Pose<B, C0> T_BC0;                    ///< of the camera that saw the places
+  double gravity_mps2 = 9.81;           ///< of the readings on its edges
+  bool boosted = false;                 ///< descriptors are boosted ones, which compare with such only
+  std::string name;                     ///< for people; empty: none
+  std::uint64_t vocabulary = 0;         ///< Vocabulary::fingerprint() of the words of its places; 0: they have none
+  std::shared_ptr<const MapBase> base;  ///< of the file that it was opened from; null: none
+  std::shared_ptr<PlaceStore> store;    ///< file with the places of keyframes that have a slot there; shared by copies
 
  private:
   std::vector<bool> in_graph() const;

@@ -24,12 +24,13 @@ bool beyond_doubt(const VerifiedPose& verified) {
 }  // namespace
 
 std::optional<Pose<M, G>> Relocaliser::consider(const MapKeyframe& query, const Quat& q_LG, const Pose<M, B>& T_MB,
-                                                const VerifiedPose& verified) {
+                                                const VerifiedPose& verified, int tag) {
   std::erase_if(guesses_, [&](const Guess& g) { return (query.t - g.t).seconds() > kGuessLife_s; });
   const Quat q_MG = about_z(yaw_of(T_MB.q * query.T_GB.q.conjugate() * q_LG.conjugate())) * q_LG;
-  const Guess guess{query.t, {q_MG, Vec3(T_MB.p - q_MG * query.T_GB.p)}};
+  const Guess guess{query.t, tag, {q_MG, Vec3(T_MB.p - q_MG * query.T_GB.p)}};
   const bool agreed = std::any_of(guesses_.begin(), guesses_.end(), [&](const Guess& g) {
-    return g.t != guess.t && (g.T_MG * query.T_GB.p - T_MB.p).norm() < kAgree_m &&
+    const bool independent = g.tag != tag || (tag == kNoTag && g.t != guess.t);
+    return independent && (g.T_MG * query.T_GB.p - T_MB.p).norm() < kAgree_m &&
            angle_between(g.T_MG.q, guess.T_MG.q) < kAgree_rad;
   });
   if (agreed || beyond_doubt(verified)) return guess.T_MG;

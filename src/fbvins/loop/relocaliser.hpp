@@ -16,14 +16,17 @@ namespace fbvins {
 
 class Relocaliser {
  public:
-  /// A recognised place puts the body of `query` at T_MB. Returns the pose of its gauge, level by `q_LG`, once that is certain.
+  /// A recognised place, or a tag by its number, puts the body of `query` at T_MB. Returns the pose of its gauge, level by
+  /// `q_LG`, once that is certain. One tag alone never is: somebody may have hung it elsewhere.
   std::optional<Pose<M, G>> consider(const MapKeyframe& query, const Quat& q_LG, const Pose<M, B>& T_MB,
-                                     const VerifiedPose& verified);
+                                     const VerifiedPose& verified, int tag = kNoTag);
   void forget() { guesses_.clear(); }
 
  private:
+  static constexpr int kNoTag = -1;
   struct Guess {
     Time t;
+    int tag;
     Pose<M, G> T_MG;
   };
   std::vector<Guess> guesses_;

@@ -27,7 +27,7 @@ std::string fault(const HeightAnchor& a) {
 
 std::string fault(const TagAnchor& a) {
   constexpr double kUnit = 1e-6;
-  for (const auto& [q, p] : {std::pair(a.T_AT.q, a.T_AT.p), std::pair(a.T_BT.q, a.T_BT.p)})
+  for (const auto& [q, p] : {std::pair(a.T_AT.q, a.has_place() ? a.T_AT.p : a.T_BT.p), std::pair(a.T_BT.q, a.T_BT.p)})
     if (!p.allFinite() || !(std::abs(q.squaredNorm() - 1) < kUnit)) return "a pose of it is none";
   return is_covariance(a.covariance) ? "" : "its covariance is not one";
 }

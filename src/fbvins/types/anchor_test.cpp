@@ -23,6 +23,10 @@ TEST(Anchor, WhatIsUsableIsSaid) {
   EXPECT_NE(impossible(HeightAnchor{.z_A_m = kNan}), "");
   EXPECT_NE(impossible(TagAnchor{.T_BT = {Quat(2, 0, 0, 0), Vec3(0, 0, 1)}}), "");
   EXPECT_NE(impossible(TagAnchor{.covariance = Mat6::Zero()}), "");
+  EXPECT_NE(impossible(TagAnchor{.T_AT = {Quat::Identity(), Vec3(1, kNan, 0)}}), "");
+  const TagAnchor landmark{.T_AT = unknown_place()};
+  EXPECT_EQ(impossible(landmark), "");
+  EXPECT_TRUE(!landmark.has_place() && TagAnchor{}.has_place());
 }
 
 }  // namespace anchor_test
