@@ -26,6 +26,7 @@ struct Flown {
 Result<Flown> fly(const std::string& path, const FromFlightArguments& a) {
   RecordingArguments recording;
   recording.path = path, recording.calibration = a.calibration, recording.imu_calibration = a.imu_calibration;
+  recording.topics = a.topics;
   const Result<std::unique_ptr<Dataset>> data = open_recording(recording, {});
   if (!data) return data.error();
   RecordingWarnings warnings;

@@ -10,6 +10,7 @@ namespace fbvins::app {
 struct FromFlightArguments {
   std::vector<std::string> runs;
   std::string calibration, imu_calibration, out;
+  std::vector<std::string> topics;  ///< of bags
   bool quiet = false;
 };
 

@@ -387,7 +387,7 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_flag("--quiet", a->quiet, "print nothing but errors");
   command->callback([a, &exit_code] {
     exit_code = !a->from_flight.empty()
-                    ? calibrate_from_flight({a->from_flight, a->calibration, a->imu_calibration, a->out, a->quiet})
+                    ? calibrate_from_flight({a->from_flight, a->calibration, a->imu_calibration, a->out, a->topics, a->quiet})
                 : a->imu_noise.empty() ? calibrate(*a)
                                        : measure_noise(*a);
   });

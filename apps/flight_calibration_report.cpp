@@ -17,7 +17,13 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* word(FlightFinding finding) {
-  return finding == FlightFinding::refined ? "refined" : finding == FlightFinding::confirmed ? "confirmed" : "not determined";
+  switch (finding) {
+    case FlightFinding::refined: return "refined";
+    case FlightFinding::confirmed: return "confirmed";
+    case FlightFinding::left: return "left";
+    case FlightFinding::not_determined: break;
+  }
+  return "not determined";
 }
 
 /// For people: degrees, mm, ms and per cent.

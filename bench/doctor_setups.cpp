@@ -2,108 +2,118 @@
 // The doctor's table (docs/doctor.md): good recordings, in which it must find nothing, and faults injected into them.
 //
 // usage: doctor_setups good RECORDING...          findings and measurements of each
-//        doctor_setups wrong RECORDING [WORD]     each injected fault, or those whose name contains the word
+//        doctor_setups wrong RECORDING [WORD] [--rows FILE]
+//                                                 each injected fault, or those whose name contains the word, compared with
+//                                                 common mistakes as `fbvins doctor` does; rows are appended to FILE as well, and
+//                                                 faults that have one there are left out
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <string_view>
+#include <string>
 
-#include "fbvins/doctor/doctor.hpp"
+#include "bench/spoilt_recording.hpp"
+#include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/doctor/gather.hpp"
-#include "fbvins/doctor/spoilers.hpp"
-#include "fbvins/io/dataset.hpp"
 
 namespace {
 
 using namespace fbvins;
+using namespace fbvins::bench;
 
-Result<Evidence> gather(const std::string& path, const Spoiler* spoiler) {
+Result<Evidence> gather(const std::string& path) {
   auto data = open_dataset(path);
   if (!data) return data.error();
-  StereoRig rig = (*data)->rig();
-  if (spoiler != nullptr && spoiler->rig) spoiler->rig(rig);
-  EvidenceGatherer gatherer(rig);
-  while (auto event = (*data)->next()) {
-    if (auto* sample = std::get_if<ImuSample>(&*event); sample && spoiler != nullptr) {
-      if (spoiler->lost && spoiler->lost(*sample)) continue;
-      if (spoiler->reading) spoiler->reading(*sample);
-    }
-    if (auto* frame = std::get_if<StereoFrame>(&*event); frame && spoiler != nullptr && spoiler->frame) spoiler->frame(*frame);
+  EvidenceGatherer gatherer((*data)->rig());
+  while (auto event = (*data)->next())
     if (!gatherer.push(*event)) break;
-  }
   return gatherer.finish();
 }
 
-void print_all(const Diagnosis& diagnosis) {
-  for (const std::string& text : diagnosis.measured) fmt::print("    {}\n", text);
-  for (const std::string& text : diagnosis.not_judged) fmt::print("    not judged: {}\n", text);
+std::string all_of(const Diagnosis& diagnosis) {
+  std::string out;
+  for (const Finding& finding : diagnosis.findings) out += fmt::format("  {}\n", to_text(finding));
+  for (const std::string& text : diagnosis.measured) out += fmt::format("    {}\n", text);
+  for (const std::string& text : diagnosis.not_judged) out += fmt::format("    not judged: {}\n", text);
+  return out;
 }
 
 int good(int count, char** paths) {
   int alarms = 0;
   for (int i = 0; i < count; ++i) {
-    const auto evidence = gather(paths[i], nullptr);
+    const auto evidence = gather(paths[i]);
     if (!evidence) return fmt::print(stderr, "{}\n", evidence.error().message), 2;
     const Diagnosis diagnosis = examine(*evidence);
     fmt::print("| {} | {} | {} |\n", paths[i], diagnosis.findings.size(), diagnosis.not_judged.size());
-    for (const Finding& finding : diagnosis.findings) fmt::print("  {}\n", to_text(finding));
-    print_all(diagnosis);
+    fmt::print("{}", all_of(diagnosis));
     std::fflush(stdout);
     alarms += static_cast<int>(diagnosis.findings.size());
   }
   return alarms > 0;
 }
 
-std::string kinds(const std::vector<Finding>& findings) {
-  std::string text;
-  for (const Finding& finding : findings) text += std::string(text.empty() ? "" : ", ") + std::string(to_string(finding.kind));
-  return text;
+/// Where only readings are spoilt the images are not looked at again, unless something is very wrong.
+Diagnosis diagnosed(const Recorded& good, const Evidence& clean, const Fault& fault) {
+  const Spoiler spoiler = fault();
+  if (!spoiler.rig && !spoiler.frame) {
+    Evidence evidence = clean;
+    if (spoiler.lost) std::erase_if(evidence.imu, spoiler.lost);
+    for (ImuSample& sample : evidence.imu)
+      if (spoiler.reading) spoiler.reading(sample);
+    Diagnosis as_given = examine(evidence);
+    if (!is_strange(as_given)) return as_given;
+  }
+  StereoRig rig = good.rig;
+  if (spoiler.rig) spoiler.rig(rig);
+  const Replay replay = [&](const TakeEvent& take) { return play(good, fault, rig.time_offset_s, take); };
+  return *diagnose(rig, replay, CalibrationStyle::kalibr);
 }
 
-int wrong(const std::string& path, std::string_view word) {
-  const auto clean = gather(path, nullptr);
+/// Whether it is named with the right size.
+bool judge(const Recorded& good, const Evidence& clean, const Fault& fault, const Rows& rows) {
+  const Spoiler spoiler = fault();
+  const Diagnosis diagnosis = diagnosed(good, clean, fault);
+  const Finding* named = nullptr;
+  for (const Finding& finding : diagnosis.findings)
+    if (finding.kind == spoiler.kind) named = &finding;
+  const bool sized = named != nullptr && (spoiler.size == 0 || std::abs(named->size - spoiler.size) <= spoiler.tolerance);
+  const bool only =
+      named != nullptr && std::ranges::all_of(diagnosis.findings, [&](const Finding& f) { return f.kind == spoiler.kind; });
+  std::string row = fmt::format(
+      "| {} | {} | {} | {} | {} | {} |\n", spoiler.name, kinds(diagnosis.findings),
+      named == nullptr ? "MISSED"
+      : only           ? "named"
+                       : "named, others too",
+      spoiler.size == 0 ? "" : fmt::format("{:.4g} +- {:.4g}", spoiler.size, spoiler.tolerance),
+      named == nullptr ? "" : fmt::format("{:.4g} +- {:.2g} {}", named->size, named->sigma, named->unit), sized ? "ok" : "WRONG");
+  if (!sized || !only) row += all_of(diagnosis);
+  rows.add(row);
+  return sized;
+}
+
+int wrong(const std::string& path, const std::string& word, const Rows& rows) {
+  const Result<Recorded> good = record(path);
+  if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
+  const auto clean = gather(path);
   if (!clean) return fmt::print(stderr, "{}\n", clean.error().message), 2;
-  int failed = 0;
-  for (Spoiler& spoiler : spoilers(clean->rig)) {
-    if (spoiler.name.find(word) == std::string::npos) continue;
-    Evidence evidence = *clean;
-    if (spoiler.rig || spoiler.frame) evidence = *gather(path, &spoiler);
-    if (!spoiler.rig && !spoiler.frame) {
-      if (spoiler.lost) std::erase_if(evidence.imu, spoiler.lost);
-      for (ImuSample& sample : evidence.imu)
-        if (spoiler.reading) spoiler.reading(sample);
-    }
-    const Diagnosis diagnosis = examine(evidence);
-    const Finding* named = nullptr;
-    for (const Finding& finding : diagnosis.findings)
-      if (finding.kind == spoiler.kind) named = &finding;
-    const bool sized = named != nullptr && (spoiler.size == 0 || std::abs(named->size - spoiler.size) <= spoiler.tolerance);
-    const bool only = named != nullptr && std::all_of(diagnosis.findings.begin(), diagnosis.findings.end(),
-                                                      [&](const Finding& f) { return f.kind == spoiler.kind; });
-    failed += !sized;
-    fmt::print("| {} | {} | {} | {} | {} | {} |\n", spoiler.name, kinds(diagnosis.findings),
-               named == nullptr ? "MISSED"
-               : only           ? "named"
-                                : "named, others too",
-               spoiler.size == 0 ? "" : fmt::format("{:.4g} +- {:.4g}", spoiler.size, spoiler.tolerance),
-               named == nullptr ? "" : fmt::format("{:.4g} +- {:.2g} {}", named->size, named->sigma, named->unit),
-               sized ? "ok" : "WRONG");
-    if (!sized || !only) {
-      for (const Finding& finding : diagnosis.findings) fmt::print("  {}\n", to_text(finding));
-      print_all(diagnosis);
-    }
-    std::fflush(stdout);
-  }
-  return failed > 0;
+  const std::vector<Spoiler> all = spoilers(good->rig);
+  bool failed = false;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (all[i].name.find(word) != std::string::npos && !rows.has(all[i].name))
+      failed |= !judge(
+          *good, *clean, [&good, i] { return spoilers(good->rig)[i]; }, rows);
+  return failed;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc >= 3 && argv[1] == std::string_view("good")) return good(argc - 2, argv + 2);
-  if (argc >= 3 && argv[1] == std::string_view("wrong")) return wrong(argv[2], argc > 3 ? argv[3] : "");
-  fmt::print(stderr, "usage: doctor_setups good RECORDING... | wrong RECORDING [WORD]\n");
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  const Rows rows(arguments);
+  const std::string mode = arguments.size() > 1 ? arguments[0] : "";
+  if (mode == "good") return good(argc - 2, argv + 2);
+  if (mode == "wrong") return wrong(arguments[1], arguments.size() > 2 ? arguments[2] : "", rows);
+  fmt::print(stderr, "usage: doctor_setups good RECORDING... | wrong RECORDING [WORD] [--rows FILE]\n");
   return 2;
 }

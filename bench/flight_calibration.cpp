@@ -3,15 +3,19 @@
 // calibration as given and as its own flight refines it; or with one that is spoilt in a known way, and as refined from there.
 // Recordings with a truth.
 //
-// usage: flight_calibration RECORDING...             calibrations as they are
-//        flight_calibration --spoilt RECORDING...    each spoilt in every way
-//        flight_calibration --together RECORDING...  refined from all flights, each flown
+// usage: flight_calibration [OPTION...] RECORDING...             calibrations as they are
+//        flight_calibration [OPTION...] --spoilt RECORDING...    each spoilt in every way
+//        flight_calibration [OPTION...] --together RECORDING...  refined from all flights, each flown
+//        flight_calibration [OPTION...] --held-out RECORDING...  spoilt in every way, refined from the first and from all but
+//                                                                the last, which alone is flown with the result
+// options: --camera left: one of a pair; --only WORD: ways of spoiling that have the word in their name
 #include <fmt/format.h>
 
 #include <cmath>
 #include <cstdio>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "fbvins/calibration/flight_calibration.hpp"
@@ -31,9 +35,15 @@ struct Flown {
   double ate_m = std::numeric_limits<double>::infinity();
 };
 
+/// The cameras that are used (DatasetOptions).
+std::string cameras_used = "all";
+/// In the names of the ways of spoiling that are tried.
+std::string only;
+
 /// `rig`: instead of the recording's own.
 Result<Flown> fly(const std::string& path, const std::optional<StereoRig>& rig) {
   DatasetOptions options;
+  options.camera = cameras_used;
   options.rig = rig;
   const Result<std::unique_ptr<Dataset>> data = open_dataset(path, options);
   if (!data) return data.error();
@@ -118,40 +128,55 @@ int together(const std::vector<std::string>& paths) {
   return 0;
 }
 
+using Cameras = std::vector<MountedCamera>;
+
 struct Spoilt {
   const char* name;
-  std::function<void(StereoRig&)> spoil;
+  std::function<void(Cameras&)> spoil;
+  double late_s = 0;
+  std::size_t fewest_cameras = 1;
 };
 
-/// Of C0 and C1 together.
-void turn_mounting(StereoRig& rig, const Vec3& turn) {
-  const Pose<C1, C0> T_C1C0 = rig.T_C1C0();
-  rig.T_BC0.q = (rig.T_BC0.q * so3_exp(turn)).normalized();
-  rig.T_BC1 = rig.T_BC0 * T_C1C0.inverse();
+/// Of all cameras together.
+void turn_mounting(Cameras& cameras, const Vec3& turn) {
+  const Pose<B, C0> before = cameras.front().T_BC;
+  Pose<B, C0> after = before;
+  after.q = (before.q * so3_exp(turn)).normalized();
+  for (MountedCamera& camera : cameras) camera.T_BC = after * (before.inverse() * camera.T_BC);
+}
+
+std::function<void(Cameras&)> turned_camera(std::size_t k) {
+  return [k](Cameras& cameras) { cameras[k].T_BC.q = (cameras[k].T_BC.q * so3_exp(Vec3(0.2, 0.2, 0.1) * kDegree)).normalized(); };
 }
 
 std::vector<Spoilt> all_spoilt() {
-  return {
-      {"baseline's direction, 0.3 degrees",
-       [](StereoRig& rig) {
-         Pose<C0, C1> T_C0C1 = rig.T_BC0.inverse() * rig.T_BC1;
-         T_C0C1.q = (T_C0C1.q * so3_exp(Vec3(0.2, 0.2, 0.1) * kDegree)).normalized();
-         rig.T_BC1 = rig.T_BC0 * T_C0C1;
-       }},
-      {"camera-IMU rotation, 0.5 degrees", [](StereoRig& rig) { turn_mounting(rig, 0.5 * kDegree * Vec3(0.6, -0.64, 0.48)); }},
-      {"time offset, 3 ms", [](StereoRig& rig) { rig.time_offset_s += 3e-3; }},
-      {"focal lengths, 1 %",
-       [](StereoRig& rig) {
-         for (Camera* camera : {&rig.left, &rig.right}) {
-           LensModel lens = camera->model();
-           std::visit([](auto& m) { m.fx *= 1.01, m.fy *= 1.01; }, lens);
-           *camera = camera->with_lens(lens);
-         }
-       }},
-      {"lever arm, 2 cm", [](StereoRig& rig) {
-         const Vec3 moved(0.012, -0.012, 0.0106);
-         rig.T_BC0.p += moved, rig.T_BC1.p += moved;
-       }}};
+  return {{"baseline's direction, 0.3 degrees", turned_camera(1), 0, 2},
+          {"third camera, 0.3 degrees", turned_camera(2), 0, 3},
+          {"camera-IMU rotation, 0.5 degrees",
+           [](Cameras& cameras) { turn_mounting(cameras, 0.5 * kDegree * Vec3(0.6, -0.64, 0.48)); }},
+          {"time offset, 3 ms", [](Cameras&) {}, 3e-3},
+          {"focal lengths, 1 %",
+           [](Cameras& cameras) {
+             for (MountedCamera& camera : cameras) {
+               LensModel lens = camera.camera.model();
+               std::visit([](auto& m) { m.fx *= 1.01, m.fy *= 1.01; }, lens);
+               camera.camera = camera.camera.with_lens(lens);
+             }
+           }},
+          {"lever arm, 2 cm", [](Cameras& cameras) {
+             for (MountedCamera& camera : cameras) camera.T_BC.p += Vec3(0.012, -0.012, 0.0106);
+           }}};
+}
+
+/// None where the rig has too few cameras for it, or it is not to be tried.
+std::optional<StereoRig> spoilt_by(const Spoilt& way, const StereoRig& good) {
+  Cameras cameras;
+  for (int k = 0; k < good.camera_count(); ++k) cameras.push_back(good.mounted(k));
+  if (cameras.size() < way.fewest_cameras || std::string_view(way.name).find(only) == std::string_view::npos) return std::nullopt;
+  way.spoil(cameras);
+  StereoRig rig = with_cameras(good, cameras);
+  rig.time_offset_s += way.late_s;
+  return rig;
 }
 
 /// Part of what was spoilt that is undone: of the spoilt parameters, as one vector in units of their priors.
@@ -175,11 +200,11 @@ int spoilt(const std::vector<std::string>& paths) {
     const Result<Flown> good = fly(path, {});
     if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
     for (const Spoilt& way : all_spoilt()) {
-      StereoRig rig = good->rig;
-      way.spoil(rig);
+      const std::optional<StereoRig> rig = spoilt_by(way, good->rig);
+      if (!rig) continue;
       const Result<Flown> flown = fly(path, rig);
       if (!flown) return fmt::print(stderr, "{}\n", flown.error().message), 2;
-      const Result<FlightCalibration> found = calibrate_from_flights({flown->tracks}, {name_of(path)}, rig, {});
+      const Result<FlightCalibration> found = calibrate_from_flights({flown->tracks}, {name_of(path)}, *rig, {});
       if (!found) {
         fmt::print("| {} | {} | | {} | {} | | {} |\n", name_of(path), way.name, mm(good->ate_m), mm(flown->ate_m),
                    found.error().message);
@@ -187,9 +212,44 @@ int spoilt(const std::vector<std::string>& paths) {
       }
       const double ate_m = found->better ? (*fly(path, found->rig)).ate_m : flown->ate_m;
       fmt::print("| {} | {} | {:.0f} % | {} | {} | {} | {} |\n  {}\n", name_of(path), way.name,
-                 100 * undone(good->rig, rig, found->rig), mm(good->ate_m), mm(flown->ate_m), mm(ate_m), found->verdict,
+                 100 * undone(good->rig, *rig, found->rig), mm(good->ate_m), mm(flown->ate_m), mm(ate_m), found->verdict,
                  changes(*found));
       std::fflush(stdout);
+    }
+  }
+  return 0;
+}
+
+/// One row of a way of spoiling: refined from these flights, the last recording flown.
+int held_out_row(const Spoilt& way, const std::vector<FlightTracks>& flights, const std::vector<std::string>& names,
+                 const Flown& good, const StereoRig& rig, double spoilt_m, const std::string& last) {
+  const Result<FlightCalibration> found = calibrate_from_flights(flights, names, rig, {});
+  if (!found) return fmt::print("| {} | {} | {} |\n", way.name, flights.size(), found.error().message), 0;
+  const double ate_m = found->better ? (*fly(last, found->rig)).ate_m : spoilt_m;
+  fmt::print("| {} | {} | {:.0f} % | {} | {} | {} | {} |\n  {}\n", way.name, flights.size(),
+             100 * undone(good.rig, rig, found->rig), mm(good.ate_m), mm(spoilt_m), mm(ate_m), found->verdict, changes(*found));
+  return std::fflush(stdout);
+}
+
+int held_out(std::vector<std::string> paths) {
+  const std::string last = paths.back();
+  paths.pop_back();
+  const Result<Flown> good = fly(last, {});
+  if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
+  fmt::print(
+      "held out: {}\n| spoilt | flights | undone | ATE unspoilt, mm | spoilt, mm | refined, mm | |\n|---|---|---|---|---|---|---|\n",
+      name_of(last));
+  for (const Spoilt& way : all_spoilt()) {
+    const std::optional<StereoRig> rig = spoilt_by(way, good->rig);
+    if (!rig) continue;
+    std::vector<FlightTracks> flights;
+    std::vector<std::string> names;
+    const double spoilt_m = (*fly(last, rig)).ate_m;
+    for (const std::string& path : paths) {
+      Result<Flown> flown = fly(path, rig);
+      if (!flown) return fmt::print(stderr, "{}\n", flown.error().message), 2;
+      flights.push_back(std::move(flown->tracks)), names.push_back(name_of(path));
+      if (flights.size() == 1 || flights.size() == paths.size()) held_out_row(way, flights, names, *good, *rig, spoilt_m, last);
     }
   }
   return 0;
@@ -198,8 +258,20 @@ int spoilt(const std::vector<std::string>& paths) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string_view mode = argc > 1 && argv[1][0] == '-' ? argv[1] : "";
-  const std::vector<std::string> paths(argv + (mode.empty() ? 1 : 2), argv + argc);
-  if (argc < 2 || paths.empty()) return fmt::print(stderr, "usage: flight_calibration [--spoilt | --together] RECORDING...\n"), 2;
-  return mode == "--spoilt" ? spoilt(paths) : mode == "--together" ? together(paths) : as_given(paths);
+  std::vector<std::string> paths(argv + 1, argv + argc);
+  while (paths.size() > 2 && (paths.front() == "--camera" || paths.front() == "--only")) {
+    (paths.front() == "--camera" ? cameras_used : only) = paths[1];
+    paths.erase(paths.begin(), paths.begin() + 2);
+  }
+  std::string mode;
+  if (!paths.empty() && paths.front().starts_with('-')) mode = paths.front(), paths.erase(paths.begin());
+  if (paths.size() < (mode == "--held-out" ? 2u : 1u))
+    return fmt::print(
+               stderr,
+               "usage: flight_calibration [--camera left] [--only WORD] [--spoilt | --together | --held-out] RECORDING...\n"),
+           2;
+  return mode == "--spoilt"     ? spoilt(paths)
+         : mode == "--together" ? together(paths)
+         : mode == "--held-out" ? held_out(paths)
+                                : as_given(paths);
 }

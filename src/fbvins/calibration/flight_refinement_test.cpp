@@ -99,6 +99,39 @@ TEST(FlightRefinement, WithoutMotionTheLeverIsNotDetermined) {
   }
 }
 
+TEST(FlightRefinement, OneCameraIsMended) {
+  const StereoRig truth = with_one_camera(flight_scene_rig());
+  StereoRig given = truth;
+  given.T_BC0.q = (truth.T_BC0.q * so3_exp(Vec3(0.3, -0.4, 0.2) * kDegree)).normalized();
+  given.T_BC1.q = given.T_BC0.q;
+  given.time_offset_s += 0.003;
+  const FlightCalibration found = refined(truth, given);
+  EXPECT_TRUE(found.better) << found.verdict;
+  EXPECT_EQ(found.rig.camera_count(), 1);
+  EXPECT_NEAR(found.rig.time_offset_s, truth.time_offset_s, 2e-4);
+  EXPECT_LT(so3_log(truth.T_BC0.q.conjugate() * found.rig.T_BC0.q).norm(), 0.1 * kDegree);
+}
+
+TEST(FlightRefinement, TheThirdOfThreeCamerasIsMended) {
+  StereoRig truth = flight_scene_rig();
+  Pose<B, C0> T_BC2 = truth.T_BC0;  // looks backwards
+  T_BC2.q = (T_BC2.q * so3_exp(Vec3(0, 180, 0) * kDegree)).normalized();
+  T_BC2.p += Vec3(0.02, 0.03, -0.06);
+  truth.more.push_back({truth.left, T_BC2});
+  StereoRig given = truth;
+  given.more[0].T_BC.q = (T_BC2.q * so3_exp(Vec3(0.3, -0.2, 0.2) * kDegree)).normalized();
+  const FlightCalibration found = refined(truth, given);
+  EXPECT_TRUE(found.better) << found.verdict;
+  ASSERT_EQ(found.rig.camera_count(), 3);
+  const auto off = [&](int camera) {
+    const Pose<B, C0> T_BC = found.rig.T_BC(camera);
+    return so3_log(truth.T_BC(camera).q.conjugate() * T_BC.q).norm();
+  };
+  EXPECT_LT(off(2), 0.05 * kDegree);
+  EXPECT_LT(off(1), 0.01 * kDegree);
+  EXPECT_EQ(parameter(found, "cam2.rx").finding, FlightFinding::refined);
+}
+
 TEST(FlightRefinement, SeveralFlightsJudgeOneAnother) {
   const StereoRig truth = flight_scene_rig();
   StereoRig given = truth;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // For tests: a flight known exactly, and what an odometry would keep of it: keyframes with small errors, readings with noise,
-// and where two cameras see the points of a room. Pure functions; fixed seeds.
+// and where the cameras see the points of a room. Pure functions; fixed seeds.
 #pragma once
 
 #include <cmath>
@@ -70,7 +70,7 @@ inline FlightTracks simulated_flight_tracks(const StereoRig& rig, double believe
     }
     const NavState<W> seen_from = motion.state(t + late_s, bias);
     for (std::size_t n = 0; n < points.size(); ++n)
-      for (int camera = 0; camera < 2; ++camera) {
+      for (int camera = 0; camera < rig.camera_count(); ++camera) {
         const auto pixel = view_of(truth, camera, {seen_from, {}, kGravity_mps2, 0}, points[n]);
         const double du = o.noise_px * rng.normal(), dv = o.noise_px * rng.normal();
         const auto first = static_cast<std::int64_t>(n % kTrackLength);

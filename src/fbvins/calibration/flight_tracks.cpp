@@ -6,11 +6,15 @@
 namespace fbvins {
 
 void FlightCollector::add(const TrackedFrame& frame) {
-  tracks_.untriggered = tracks_.untriggered || frame.offsets.are_apart(0, 1);
   std::vector<FlightView>& views = seen_[frame.id];
+  const auto see = [&](TrackId track, int camera, const std::optional<Observation>& seen) {
+    if (!seen) return;
+    tracks_.untriggered = tracks_.untriggered || frame.offsets.are_apart(0, camera);
+    views.push_back({track, camera, seen->pixel});
+  };
   for (const TrackedFeature& feature : frame.features) {
-    if (feature.left) views.push_back({feature.id, feature.cameras.left, feature.left->pixel});
-    if (feature.right) views.push_back({feature.id, feature.cameras.right, feature.right->pixel});
+    see(feature.id, feature.cameras.left, feature.left);
+    see(feature.id, feature.cameras.right, feature.right);
   }
 }
 

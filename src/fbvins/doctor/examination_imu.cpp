@@ -136,6 +136,9 @@ void Examination::gyro_axes(const TurnFit& fit) {
 }
 
 void Examination::motion() {
+  // From the rotations where that predicts features better than what was given: a rig that hardly turns tells little of time.
+  if (prediction_error_px(pairs_, imu_, {rig_, rig_.time_offset_s}) <= prediction_error_px(pairs_, imu_, {rig_, offset_s_}))
+    offset_s_ = rig_.time_offset_s;
   const MotionFit fit = with_common_focal(fit_motion(pairs_, imu_, {rig_, offset_s_, false}));
   if (!fit.usable) {
     not_judged("rotation and time between camera and IMU: too few images with readings around them");

@@ -17,8 +17,11 @@ constexpr std::size_t kApart = 3;
 /// Motion across an edge after which another one lies there: of the scene, and by the rig's turn alone, which moves what is far
 /// away, or ahead, as well.
 constexpr float kAcross_px = 8, kTurned_px = 8;
-/// Between which the scene moved across an edge; and in the whole recording.
-constexpr int kFewestPairs = 10, kFewestJudged = 20;
+/// Of the gyroscope, which is not known yet: the turn of a rig that hovers for seconds from one view to the next may be nothing
+/// else. More is a finding of its own.
+constexpr double kMostBias_radps = 0.1;
+/// Between which the scene moved across an edge; in the whole recording as well.
+constexpr int kFewestPairs = 20;
 /// Mean gradient of an edge, grey values a pixel of the small image: more than noise has. Vignetting has as much towards the edge
 /// of a wide lens's image, but nearly the same all around: what pixels within kAround_px have in common is no edge.
 constexpr double kEdge = 2;
@@ -55,19 +58,27 @@ struct Look {
   const Image* image;
   Eigen::Vector2f moved_px = Eigen::Vector2f::Zero();
   Eigen::Vector3f turned_rad = Eigen::Vector3f::Zero();  ///< of the camera, in its frame
+  float by_bias_rad = 0;                                 ///< of which so much may be the gyroscope's bias
 };
 
-/// One camera's looks, and its pinhole in the small images.
+/// One camera's looks.
 struct Looks {
   std::vector<Look> all;
-  float focal_px = 1;
-  Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();
+  const Camera* camera = nullptr;
 
-  /// Motion of a far point at a pixel of the small image by a small turn, px of the camera.
-  Eigen::Vector2f motion_px(int x, int y, const Eigen::Vector3f& turned_rad) const {
-    const float u = (static_cast<float>(x) - centre_px.x()) / focal_px, v = (static_cast<float>(y) - centre_px.y()) / focal_px;
-    const float a = turned_rad.x(), b = turned_rad.y(), c = turned_rad.z();
-    return 2 * focal_px * Eigen::Vector2f(u * v * a - (1 + u * u) * b + v * c, (1 + v * v) * a - u * v * b - u * c);
+  /// Motion of a far point at a pixel of the small image by a small turn, px of the camera a radian: by its lens, at whose edge a
+  /// fisheye's is half of a pinhole's. Zero where the lens sees nothing.
+  Eigen::Matrix<float, 2, 3> motion_by_turn(int x, int y) const {
+    constexpr double kTurn_rad = 1e-3;
+    Eigen::Matrix<float, 2, 3> out = Eigen::Matrix<float, 2, 3>::Zero();
+    const Vec2 pixel(2 * x, 2 * y);
+    const auto ray = camera->ray(pixel);
+    for (int i = 0; ray && i < 3; ++i) {
+      const auto there = camera->pixel_of(*ray + kTurn_rad * Vec3::Unit(i).cross(*ray));
+      if (!there) return Eigen::Matrix<float, 2, 3>::Zero();
+      out.col(i) = ((*there - pixel) / kTurn_rad).cast<float>();
+    }
+    return out;
   }
 };
 
@@ -111,11 +122,12 @@ bool stays(const Looks& of, int x, int y, const Eigen::Vector2f& shared, std::ve
   if (strength < kEdge) return false;
   const Eigen::Vector2f across = mean / strength;
   const auto there = [&](std::size_t i) { return gradients[i].dot(across) > kStrength * strength; };
+  const Eigen::RowVector3f by_turn = across.transpose() * of.motion_by_turn(x, y);
   int pairs = 0, stayed = 0, present = 0;
   for (std::size_t i = 0; i < looks.size(); ++i) {
     present += there(i);
     if (i < kApart || std::abs(looks[i].moved_px.dot(across)) < kAcross_px ||
-        std::abs(of.motion_px(x, y, looks[i].turned_rad).dot(across)) < kTurned_px)
+        std::abs(by_turn.dot(looks[i].turned_rad)) < kTurned_px + by_turn.norm() * looks[i].by_bias_rad)
       continue;
     ++pairs;
     stayed += there(i - kApart) && there(i);
@@ -197,6 +209,18 @@ void judge(FixedInView& out, std::size_t side, const Looks& looks, const Camera&
   out.masks[side] = std::make_shared<const Mask>(seen);
 }
 
+/// The gyroscope's bias may be so large: what the rig turns in the mean, which over a whole recording is little.
+double bias_at_most(const std::vector<const SmallView*>& views, const ImuSeries& imu) {
+  Vec3 turned_rad = Vec3::Zero();
+  double time_s = 0;
+  for (std::size_t i = 1; i < views.size(); ++i) {
+    if (!imu.covers(views[i - 1]->t, views[i]->t)) continue;
+    turned_rad += imu.turned(views[i - 1]->t, views[i]->t);
+    time_s += (views[i]->t - views[i - 1]->t).seconds();
+  }
+  return time_s > 0 ? std::min(kMostBias_radps, turned_rad.norm() / time_s) : 0;
+}
+
 }  // namespace
 
 void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const Pyramid& right) {
@@ -225,35 +249,37 @@ void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const P
   stride_ *= 2;
 }
 
-bool FixedInView::judged() const { return pairs >= kFewestJudged; }
+bool FixedInView::judged() const { return pairs >= kFewestPairs; }
 
 FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
   FixedInView out;
   std::array<Looks, 2> looks;
-  for (int side = 0; side < 2; ++side) {
-    const auto [fx, fy, cx, cy] = evidence.rig.camera(side).intrinsics();
-    looks[static_cast<std::size_t>(side)].focal_px = static_cast<float>(0.25 * (fx + fy));
-    looks[static_cast<std::size_t>(side)].centre_px = Eigen::Vector2d(0.5 * cx, 0.5 * cy).cast<float>();
-  }
+  for (int side = 0; side < 2; ++side) looks[static_cast<std::size_t>(side)].camera = &evidence.rig.camera(side);
   std::vector<const SmallView*> views;
   for (const SmallView& view : evidence.views)
     if (view.left && view.right) views.push_back(&view);
+  const double bias_radps = bias_at_most(views, imu);
   for (std::size_t i = 0; i < views.size(); ++i) {
     Vec2 moved_px = Vec2::Zero();
     Vec3 turned_rad = Vec3::Zero();
+    float by_bias_rad = 0;
     bool known = i >= kApart && imu.covers(views[i - kApart]->t, views[i]->t);
     for (std::size_t k = i - kApart + 1; known && k <= i; ++k) {
       known = !views[k]->moved_px.isZero();
       moved_px += views[k]->moved_px;
     }
     // People who walk past a rig at rest move in the image, too.
-    if (known) turned_rad = imu.turned(views[i - kApart]->t, views[i]->t);
-    else moved_px.setZero();
-    out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left.focal_px() * turned_rad.norm() > kTurned_px;
+    if (known) {
+      turned_rad = imu.turned(views[i - kApart]->t, views[i]->t);
+      by_bias_rad = static_cast<float>(bias_radps * (views[i]->t - views[i - kApart]->t).seconds());
+    } else {
+      moved_px.setZero();
+    }
+    out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left.focal_px() * (turned_rad.norm() - by_bias_rad) > kTurned_px;
     for (int side = 0; side < 2; ++side)
       looks[static_cast<std::size_t>(side)].all.push_back(
           {(side == 0 ? views[i]->left : views[i]->right).get(), moved_px.cast<float>(),
-           Vec3(evidence.rig.T_BC(side).q.conjugate() * turned_rad).cast<float>()});
+           Vec3(evidence.rig.T_BC(side).q.conjugate() * turned_rad).cast<float>(), by_bias_rad});
   }
   if (!out.judged()) return out;
   judge(out, 0, looks[0], evidence.rig.left);

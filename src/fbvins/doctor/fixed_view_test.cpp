@@ -111,6 +111,8 @@ TEST(FixedView, IsNotJudgedWhereTheReadingsShowNoTurn) {
   Evidence seen = with_bar();
   seen.imu = swinging(false);
   EXPECT_FALSE(find_fixed(seen, ImuSeries(seen.imu)).judged());
+  for (ImuSample& sample : seen.imu) sample.gyro_radps = Vec3(0.06, -0.06, 0.04);  // a gyroscope's bias alone
+  EXPECT_FALSE(find_fixed(seen, ImuSeries(seen.imu)).judged());
   seen.imu.clear();
   EXPECT_FALSE(find_fixed(seen, ImuSeries(seen.imu)).judged());
 }

@@ -37,6 +37,8 @@ constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5
                                               1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
 
 constexpr int kIterations = 4;
+/// Of a step towards the end of a lens model's range.
+constexpr double kLeastShare = 1e-3;
 constexpr double kCap_px = 3, kHuberSigmas = 2, kLeastSigma_px = 0.03;
 constexpr std::size_t kFeaturesOfAPair = 40;
 constexpr double kDifference_m = 1e-4;
@@ -229,12 +231,18 @@ BlockFit MotionProblem::linearise() {
   return fit;
 }
 
+double MotionProblem::in_model(const VectorXd& step) const {
+  double share = 1;
+  while (share > 0 && !in_range(Hypothesis(start_, x + share * step).camera)) share = share > kLeastShare ? 0.5 * share : 0;
+  return share;
+}
+
 std::optional<BlockSolution> MotionProblem::converge() {
   std::optional<BlockSolution> last;
   for (int i = 0; i < kIterations; ++i) {
     last = linearise().solve(free);
     if (!last) return std::nullopt;
-    x += last->x;
+    x += in_model(last->x) * last->x;
   }
   const Hypothesis at = hypothesis();
   const double sigma = std::max(typical_error(), kLeastSigma_px);

@@ -61,6 +61,8 @@ class MotionProblem {
 
  private:
   BlockFit linearise();
+  /// The share of a step with which the lens stays within the range of its model.
+  double in_model(const Eigen::VectorXd& step) const;
 
   std::vector<FramePair> pairs_;
   const ImuSeries* imu_;

@@ -12,6 +12,8 @@
 #include "fbvins/doctor/image_health.hpp"
 #include "fbvins/doctor/imu_health.hpp"
 #include "fbvins/doctor/imu_series.hpp"
+#include "fbvins/doctor/lens_change.hpp"
+#include "fbvins/doctor/motion_problem.hpp"
 #include "fbvins/doctor/stereo_step.hpp"
 #include "fbvins/doctor/synthetic_evidence.hpp"
 #include "fbvins/imu/propagation.hpp"
@@ -173,6 +175,22 @@ TEST(Depths, AreThoseOfTheNewCalibration) {
       EXPECT_NEAR(std::abs(after - before), 0.01 / 0.11, 0.01);
     }
   });
+}
+
+TEST(MotionProblem, ALensStaysInTheRangeOfItsModel) {
+  Evidence evidence = test::SyntheticEvidence({}).make();
+  const ImuSeries imu(evidence.imu);
+  for (const double alpha : {0.5, 0.95}) {
+    // A focal length that is very wrong and not free: the shape that would make up for it is none of the model.
+    evidence.rig.left = Camera(ExtendedUnified{1200, 1200, 367, 248, alpha, 1}, 752, 480);
+    evidence.working_rig = evidence.rig;
+    MotionProblem problem(pair_frames(evidence), imu, {evidence.rig});
+    ASSERT_GT(problem.pairs(), 20u);
+    problem.free = {doctor::motion::kRadial, doctor::motion::kRadial + 1};
+    ASSERT_TRUE(problem.converge());
+    EXPECT_TRUE(in_range(problem.hypothesis().camera)) << problem.x.transpose();
+    EXPECT_GT(alpha + problem.x[doctor::motion::kRadial], 0.98) << "does not reach the end of the range";
+  }
 }
 
 }  // namespace parts_test
