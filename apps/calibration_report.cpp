@@ -62,6 +62,8 @@ Json imu_json(const CameraImuResult& imu) {
   for (const CameraOnImu& c : imu.cameras)
     out["cameras"].push_back({{"T_imu_cam", pose_json(c.T_BC)},
                               {"covariance", matrix_json(c.covariance)},
+                              {"later_s", c.later_s},
+                              {"later_sigma_s", c.later_sigma_s},
                               {"rms_px", c.rms_px},
                               {"views", c.views},
                               {"corners", c.corners},

@@ -195,8 +195,9 @@ Result<CalibrationOutcome> solve(const Arguments& a, const Board& board, const M
   outcome.remarks = material.remarks;
   CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
   if (!a.quiet) options.on_progress = [](const std::string& what) { note(what); };
-  // Cameras that never see the board together are joined by the IMU, if there is one.
-  const bool apart = !material.imu.empty() && !cameras_connected(material.detections, board, options.pair_tolerance_s);
+  // Cameras that never see the board together, or not at one time, are joined by the IMU, if there is one.
+  const bool connected = cameras_connected(material.detections, board, options.pair_tolerance_s);
+  const bool apart = !material.imu.empty() && (a.imu_options.camera_offsets || !connected);
   Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material.detections, board, options)
                                             : calibrate_cameras(material.detections, board, options);
   if (!cameras) return cameras.error();
@@ -214,7 +215,8 @@ Result<CalibrationOutcome> solve(const Arguments& a, const Board& board, const M
   if (!imu) return Error{imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"};
   for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
     outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
-  if (apart) outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
+  if (!connected && apart)
+    outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
   outcome.imu = *std::move(imu);
   return outcome;
 }
@@ -365,6 +367,7 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--cameras-only", a->cameras_only, "leave the IMU out");
   command->add_flag("--imu-axes", a->imu_options.imu_axes, "estimate scale and axes of the IMU, too");
+  command->add_flag("--camera-offsets", a->imu_options.camera_offsets, "estimate a time offset of each camera, too");
   command->add_flag("--line-delay", a->imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
   command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
       ->capture_default_str();

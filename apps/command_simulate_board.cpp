@@ -79,6 +79,9 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->add_option("--time-offset", a->options.time_offset_ms, "ms, IMU's stamp less image's")
       ->check(CLI::Range(-400.0, 400.0))
       ->capture_default_str();
+  command->add_option("--later", a->options.later_ms, "ms by which each camera takes its image later than the one before it")
+      ->check(CLI::Range(-40.0, 40.0))
+      ->capture_default_str();
   command
       ->add_option("--motion", a->movements, "the hand's only movements: distance, across, up, aim (at the board's parts), roll")
       ->delimiter(',')

@@ -104,6 +104,8 @@ Result<StereoRig> board_flight_rig(const BoardFlightOptions& options) {
       const SimulatedRig one = k == 1 ? cameras : further_camera(left, k);
       mounted.push_back({one.cameras[1], rig.T_BC0 * one.T_CnC0[1].inverse().cast_frames<C0, C0>()});
     }
+    for (std::size_t k = 1; k < mounted.size(); ++k)
+      mounted[k].camera.set_own_times({1e-3 * options.later_ms * static_cast<double>(k), 0});
     rig = with_cameras(std::move(rig), mounted);
     rig.image_rate_hz = options.image_rate_hz;
     rig.time_offset_s = 1e-3 * options.time_offset_ms;
@@ -137,8 +139,8 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
       Rng rng(seed, k < 2 ? static_cast<std::uint64_t>(2 * i + k + 1)
                           : static_cast<std::uint64_t>(k) << 32 | static_cast<std::uint64_t>(i));
       const Pose<B, Cn> T_BC = rig->T_BC(k).cast_frames<B, Cn>();
-      return std::make_shared<const Image>(
-          cameras[static_cast<std::size_t>(k)].render(poses(hand, T_WT, T_BC, middle_s, exposure_s), look, rng));
+      return std::make_shared<const Image>(cameras[static_cast<std::size_t>(k)].render(
+          poses(hand, T_WT, T_BC, middle_s + rig->camera(k).own_times().time_offset_s, exposure_s), look, rng));
     };
     std::vector<std::future<std::shared_ptr<const Image>>> others;
     for (int k = 1; k < rig->camera_count(); ++k) others.push_back(std::async(std::launch::async, take, k));

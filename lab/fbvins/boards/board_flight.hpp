@@ -26,6 +26,7 @@ struct BoardFlightOptions {
   double blur_px = 0.6;       ///< of the lens, standard deviation
   double noise = 2;           ///< of a grey value, standard deviation
   double time_offset_ms = 5;  ///< stamp of the IMU less that of the image at the same instant
+  double later_ms = 0;        ///< so much later than the one before it each camera takes its image, which has the same stamp
   int seed = 1;
   std::vector<int> missing_tags = {};  ///< places of the board that stay white
   HandMotion motion = {};              ///< for recordings that do not determine a calibration

@@ -75,7 +75,11 @@ RigCalibration rig_calibration(const CameraCalibration& cameras) {
 
 RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImuResult& imu, const ImuNoise& noise) {
   RigCalibration out = rig_calibration(cameras);
-  for (const CameraOnImu& camera : imu.cameras) out.T_BC.push_back(camera.T_BC);
+  for (std::size_t k = 0; k < imu.cameras.size(); ++k) {
+    const CameraOnImu& camera = imu.cameras[k];
+    out.T_BC.push_back(camera.T_BC);
+    out.cameras[k].set_own_times({camera.later_s, 0});
+  }
   out.time_offset_s = imu.time_offset_s;
   out.imu_noise = noise;
   return out;

@@ -90,7 +90,7 @@ CalibrationProgress GrowingCalibration::judge(const GrowingInput& input) {
   options.max_views = most_stamps_;
   options.models = models_for(some.views.size());
   const bool with_imu = options_.with_imu && !input.imu.empty();
-  const bool apart = with_imu && !cameras_connected(some, board_, options.pair_tolerance_s);
+  const bool apart = with_imu && (options_.imu.camera_offsets || !cameras_connected(some, board_, options.pair_tolerance_s));
   const auto cameras = apart ? calibrate_cameras_apart(some, board_, options) : calibrate_cameras(some, board_, options);
   const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (took_s > options_.patience_s) most_stamps_ = std::max(kFewestStamps, most_stamps_ * 3 / 4);
@@ -131,7 +131,7 @@ void GrowingCalibration::judge_imu(const GrowingInput& input, const CameraCalibr
     imu_views_ = input.detections.views.size();
     ImuCameraInput fit{
         board_, {}, {}, thinned_in_time(input.detections.views), input.imu, options_.imu_noise, rig_variations(cameras)};
-    const bool joined = knowledge_of(cameras).joined.back();
+    const bool joined = !options_.imu.camera_offsets && knowledge_of(cameras).joined.back();
     for (const CalibratedCamera& camera : cameras.cameras) {
       fit.cameras.push_back(camera.camera);
       if (joined) fit.T_CnC0.push_back(camera.T_CnC0);

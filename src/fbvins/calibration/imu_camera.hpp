@@ -36,6 +36,8 @@ struct ImuCameraOptions {
   double camera_sigma_m = 1e-6, camera_sigma_rad = 1e-6;
   bool imu_axes = false;    ///< estimate scale and axes of both triads
   bool line_delay = false;  ///< estimate the line delay of a rolling shutter, the same for all cameras
+  bool camera_offsets =
+      false;  ///< estimate a time offset of each camera; T_CnC0 are to be none then, or from images taken at once
   double gravity_mps2 = 9.81;
   double gravity_sigma_mps2 = 0.02;  ///< it differs by that much between places
   double knot_spacing_s = 0;         ///< of the path's spline; 0: chosen by the readings' residuals
@@ -43,7 +45,8 @@ struct ImuCameraOptions {
 
 struct CameraOnImu {
   Pose<B, Cn> T_BC;
-  Mat6 covariance = Mat6::Zero();  ///< of (dp in B, dtheta in C): T_BC.boxplus
+  Mat6 covariance = Mat6::Zero();         ///< of (dp in B, dtheta in C): T_BC.boxplus
+  double later_s = 0, later_sigma_s = 0;  ///< t_imu = t_image + time_offset_s + later_s; none of camera 0
   int views = 0, corners = 0, outliers = 0;
   double rms_px = 0;  ///< of one coordinate, without outliers
 };

@@ -169,7 +169,7 @@ std::vector<CalibrationReading> readings_within(const ImuCameraInput& input, con
 
 /// Views whose image has a pose and lies within the path; returns the standard deviations of their corners, px.
 std::vector<double> gather_views(const ImuCameraInput& input, const CameraPoses& located, const CommonTime& common,
-                                 double time_offset_s, bool by_rows, CalibrationData& data) {
+                                 const std::vector<double>& offsets_s, bool by_rows, CalibrationData& data) {
   std::map<std::pair<int, std::int64_t>, const SeenPose*> fits;
   for (const auto& camera : located)
     for (const SeenPose& pose : camera) fits[{pose.camera, std::llround(pose.t_s * 1e6)}] = &pose;
@@ -177,7 +177,8 @@ std::vector<double> gather_views(const ImuCameraInput& input, const CameraPoses&
   for (const BoardView& view : input.views) {
     const double t_s = (view.t - input.imu.front().t).seconds();
     const auto fit = fits.find({view.camera, std::llround(t_s * 1e6)});
-    if (fit == fits.end() || !common.holds(t_s + time_offset_s - common.begin_s, 0.25 * kMargin_s)) continue;
+    const double offset_s = offsets_s[static_cast<std::size_t>(view.camera)];
+    if (fit == fits.end() || !common.holds(t_s + offset_s - common.begin_s, 0.25 * kMargin_s)) continue;
     sigmas.push_back(fit->second->sigma_px);
     for (CalibrationView& v : views_of(input, view, t_s - common.begin_s, by_rows)) {
       leave_out_strays(input.cameras[static_cast<std::size_t>(v.camera)], *fit->second, v);
@@ -200,12 +201,13 @@ void leave_out_alone(const std::vector<BodyPose>& body, std::vector<CalibrationR
 }
 
 CalibrationState first_state(PoseSpline path, double spacing_s, const std::vector<Pose<B, Cn>>& T_BC, const TurnMatch& match,
-                             const std::vector<CalibrationReading>& readings) {
+                             const std::vector<double>& offsets_s, const std::vector<CalibrationReading>& readings) {
   CalibrationState state{.path = std::move(path), .biases = {}, .T_BC = T_BC, .axes = {}};
   state.intervals_per_bias = std::max(1, static_cast<int>(std::lround(kBiasNode_s / spacing_s)));
   state.biases.assign(static_cast<std::size_t>((state.path.intervals() - 1) / state.intervals_per_bias + 2),
                       {match.gyro_bias_radps, Vec3::Zero()});
   state.time_offset_s = match.time_offset_s;
+  for (const double offset_s : offsets_s) state.later_s.push_back(offset_s - match.time_offset_s);
   Vec3 force_T = Vec3::Zero();
   for (const CalibrationReading& r : readings)
     force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(readings.size());
@@ -224,7 +226,21 @@ CalibrationSetup setup_of(const ImuCameraInput& input, const ImuCameraOptions& o
   setup.T_CnC0 = input.T_CnC0;
   setup.camera_sigma_m = options.camera_sigma_m, setup.camera_sigma_rad = options.camera_sigma_rad;
   setup.free_axes = options.imu_axes, setup.free_line_delay = options.line_delay;
+  setup.free_camera_offsets = options.camera_offsets;
   return setup;
+}
+
+/// Of each camera: camera 0's, or by the turns that its own images show.
+Result<std::vector<double>> first_offsets(const CameraPoses& poses, const GyroIntegral& gyro, const TurnMatch& match,
+                                          const ImuCameraOptions& options) {
+  std::vector<double> offsets_s(poses.size(), match.time_offset_s);
+  for (std::size_t c = 1; options.camera_offsets && c < poses.size(); ++c) {
+    Result<TurnMatch> own = match_turns(poses[c], gyro, options.max_time_offset_s);
+    if (own) own = check_turns(*own);
+    if (!own) return refused(fmt::format("camera {} alone: {}", c, own.error().message));
+    offsets_s[c] = own->time_offset_s;
+  }
+  return offsets_s;
 }
 
 }  // namespace
@@ -242,7 +258,9 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   if (!match) return match.error();
   const auto T_BC = first_extrinsics(input, poses, gyro, *match);
   if (!T_BC) return T_BC.error();
-  std::vector<BodyPose> body = body_poses(*located, *T_BC, match->time_offset_s);
+  const auto offsets_s = first_offsets(poses, gyro, *match, options);
+  if (!offsets_s) return offsets_s.error();
+  std::vector<BodyPose> body = body_poses(*located, *T_BC, *offsets_s);
 
   const Result<CommonTime> common = common_time(gyro, body);
   if (!common) return common.error();
@@ -256,14 +274,14 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   if (body.size() < kFewestBoardViews)
     return refused("the board's poses do not follow the turns of the IMU: is it the right board file?");
 
-  const std::vector<double> sigmas = gather_views(input, *located, *common, match->time_offset_s, options.line_delay, data);
+  const std::vector<double> sigmas = gather_views(input, *located, *common, *offsets_s, options.line_delay, data);
   if (data.views.empty()) return refused("no image of the board lies within the readings of the IMU");
   leave_out_alone(body, data.readings);
 
   const double rate_hz = rate_hz_of(input.imu);
   const double spacing_s = options.knot_spacing_s > 0 ? options.knot_spacing_s : std::max(kDefaultSpacing_s, 2.0 / rate_hz);
   CalibrationState state = first_state(first_path(body, data.readings, match->gyro_bias_radps, spacing_s, common->length_s()),
-                                       spacing_s, *T_BC, *match, data.readings);
+                                       spacing_s, *T_BC, *match, *offsets_s, data.readings);
   if (auto wrong = check_unit(state.gravity_T.norm())) return *wrong;
 
   CalibrationSetup setup = setup_of(input, options, median_of(sigmas), rate_hz);

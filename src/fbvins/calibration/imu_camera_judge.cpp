@@ -99,6 +99,9 @@ std::optional<Error> check_determined(const CameraImuResult& result, const Vec3&
   }
   if (!(result.time_offset_sigma_s < kWorstOffset_s))
     return refused(fmt::format("the time offset stays uncertain to {:.1f} ms: turn faster", 1e3 * result.time_offset_sigma_s));
+  for (std::size_t c = 1; c < result.cameras.size(); ++c)
+    if (const double sigma_s = result.cameras[c].later_sigma_s; !(sigma_s < kWorstOffset_s))
+      return refused(fmt::format("the time offset of camera {} stays uncertain to {:.1f} ms: turn faster", c, 1e3 * sigma_s));
   return std::nullopt;
 }
 

@@ -100,16 +100,19 @@ Result<std::vector<Pose<B, Cn>>> first_extrinsics(const ImuCameraInput& input, c
   return T_BC;
 }
 
-std::vector<BodyPose> body_poses(const CameraPoses& poses, const std::vector<Pose<B, Cn>>& T_BC, double time_offset_s) {
+std::vector<BodyPose> body_poses(const CameraPoses& poses, const std::vector<Pose<B, Cn>>& T_BC,
+                                 const std::vector<double>& offsets_s) {
   std::map<long, SeenPose> by_time;  // in steps of 0.1 ms
   for (const auto& camera : poses)
     for (const SeenPose& pose : camera) {
-      const auto [at, fresh] = by_time.emplace(std::lround(pose.t_s * 1e4), pose);
+      const double t_s = pose.t_s + (offsets_s[static_cast<std::size_t>(pose.camera)] - offsets_s[0]);
+      const auto [at, fresh] = by_time.emplace(std::lround(t_s * 1e4), pose);
       if (!fresh && pose.sigma_px < at->second.sigma_px) at->second = pose;
     }
   std::vector<BodyPose> out;
   for (const auto& [step, pose] : by_time)
-    out.push_back({pose.t_s + time_offset_s, pose.T_TC * T_BC[static_cast<std::size_t>(pose.camera)].inverse()});
+    out.push_back({pose.t_s + offsets_s[static_cast<std::size_t>(pose.camera)],
+                   pose.T_TC * T_BC[static_cast<std::size_t>(pose.camera)].inverse()});
   return out;
 }
 

@@ -21,6 +21,7 @@ CameraPoses good_ones(CameraPoses poses);
 Result<std::vector<Pose<B, Cn>>> first_extrinsics(const ImuCameraInput& input, const CameraPoses& poses, const GyroIntegral& gyro,
                                                   const TurnMatch& match);
 /// Where the body was at the images, one pose an instant, on the IMU's clock.
-std::vector<BodyPose> body_poses(const CameraPoses& poses, const std::vector<Pose<B, Cn>>& T_BC, double time_offset_s);
+std::vector<BodyPose> body_poses(const CameraPoses& poses, const std::vector<Pose<B, Cn>>& T_BC,
+                                 const std::vector<double>& offsets_s);
 
 }  // namespace fbvins

@@ -31,6 +31,7 @@ ImuBias CalibrationState::bias_at(double t_s) const {
 
 ImuCameraProblem::ImuCameraProblem(CalibrationData data, CalibrationState state, CalibrationSetup setup)
     : data_(std::move(data)), state_(std::move(state)), before_(state_), setup_(std::move(setup)) {
+  state_.later_s.resize(data_.cameras.size(), 0.0);
   lay_out();
 }
 
@@ -66,6 +67,7 @@ void ImuCameraProblem::lay_out() {
   layout_.gravity = take(3);
   if (setup_.free_board_scale) layout_.board_scale = take(1);
   if (setup_.free_line_delay) layout_.line_delay = take(1);
+  if (setup_.free_camera_offsets && data_.cameras.size() > 1) layout_.later = take(static_cast<int>(data_.cameras.size()) - 1);
   if (setup_.free_axes) layout_.axes = take(15);
   first.resize(static_cast<std::size_t>(layout_.end), 0);
   system_.emplace(std::move(first));
@@ -210,6 +212,8 @@ double ImuCameraProblem::apply_step() {
   state_.gravity_T += at(layout_.gravity);
   if (layout_.board_scale >= 0) state_.board_scale += step_(layout_.board_scale);
   if (layout_.line_delay >= 0) state_.line_delay_s += step_(layout_.line_delay);
+  if (layout_.later >= 0)
+    for (std::size_t c = 1; c < state_.later_s.size(); ++c) state_.later_s[c] += step_(layout_.later + static_cast<int>(c) - 1);
   if (layout_.axes >= 0) {
     for (int row = 0; row < 3; ++row) state_.axes.gyro.row(row) += at(layout_.axes + 3 * row).transpose();
     for (int row = 0, i = layout_.axes + 9; row < 3; ++row)

@@ -53,6 +53,7 @@ struct CalibrationState {
   std::vector<ImuBias> biases;  ///< one every so many intervals of the path, from its start
   std::vector<Pose<B, Cn>> T_BC;
   double time_offset_s = 0, line_delay_s = 0;
+  std::vector<double> later_s;  ///< of each camera beside the time offset; 0 of camera 0
   Vec3 gravity_T = Vec3(0, 0, -9.81);
   double board_scale = 1;
   ImuTriads axes;
@@ -71,12 +72,13 @@ struct CalibrationSetup {
   double gravity_mps2 = 9.81, gravity_sigma_mps2 = 0.02;
   std::vector<Pose<Cn, C0>> T_CnC0;  ///< as given; empty: free
   double camera_sigma_m = 1e-6, camera_sigma_rad = 1e-6;
-  bool free_board_scale = false, free_axes = false, free_line_delay = false;
+  bool free_board_scale = false, free_axes = false, free_line_delay = false, free_camera_offsets = false;
 };
 
 /// Where the calibration's unknowns lie, after those of the chain; -1: not estimated.
 struct CalibrationLayout {
   std::vector<int> cameras;                                                          ///< six each: dp in B, dtheta in C
+  int later = -1;                                                                    ///< of the cameras from 1 on
   int time_offset = -1, line_delay = -1, gravity = -1, board_scale = -1, axes = -1;  ///< axes: gyro by rows (9), accel (6)
   int begin = 0, end = 0;
 };
@@ -161,6 +163,8 @@ class ImuCameraProblem {
   double add_images(bool build);  ///< what the rig's numbers enter
   double add_camera_prior(std::size_t camera, bool build);
 
+  /// When a view was taken, since the path's start.
+  double taken_s(const CalibrationView& view) const;
   ViewMotion view_motion(const CalibrationView& view, SplineJacobian* J) const;
   std::optional<Vec3> corner_in_camera(const CalibrationView& view, const WeightedCorner& corner, const ViewMotion& motion,
                                        double late_s = 0) const;

@@ -28,6 +28,8 @@ std::vector<CalibratedParameter> parameters_of(const CalibrationState& state, co
   set(layout.time_offset, "time_offset", "s", state.time_offset_s);
   for (int k = 0; k < 3; ++k) set(layout.gravity + k, fmt::format("gravity_T_{}", axis[k]), "m/s^2", state.gravity_T(k));
   if (layout.line_delay >= 0) set(layout.line_delay, "line_delay", "s", state.line_delay_s);
+  for (std::size_t c = 1; layout.later >= 0 && c < state.later_s.size(); ++c)
+    set(layout.later + static_cast<int>(c) - 1, fmt::format("later_{}", c), "s", state.later_s[c]);
   if (layout.axes >= 0)
     for (int row = 0, accel = layout.axes + 9; row < 3; ++row)
       for (int column = 0; column < 3; ++column) {
@@ -103,7 +105,8 @@ CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& s
   const auto sigma = [&](int index) { return out.parameters[static_cast<std::size_t>(index - at.begin)].sigma; };
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
     const int i = at.cameras[c] - at.begin;
-    out.cameras.push_back({state.T_BC[c], out.covariance.block<6, 6>(i, i)});
+    out.cameras.push_back({state.T_BC[c], out.covariance.block<6, 6>(i, i), state.later_s[c]});
+    if (at.later >= 0 && c > 0) out.cameras[c].later_sigma_s = sigma(at.later + static_cast<int>(c) - 1);
   }
   out.time_offset_s = state.time_offset_s, out.time_offset_sigma_s = sigma(at.time_offset);
   out.gravity_T = state.gravity_T;

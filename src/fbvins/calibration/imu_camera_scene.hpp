@@ -24,6 +24,7 @@ struct HandHeldOptions {
                  .gyro_random_walk_radps2_rthz = 2e-5,
                  .accel_random_walk_mps3_rthz = 3e-3};
   double time_offset_s = 0.0123, line_delay_s = 0;
+  double later_s = 0;           ///< of each camera after the one before it, with the same stamp
   Vec3 turning = Vec3::Ones();  ///< factor on the turns about each axis of B
   double moving = 1;            ///< factor on the translation
   ImuTriads axes;
@@ -185,7 +186,7 @@ class HandHeld {
     for (int c = 0; c < o_.cameras && !hidden; ++c) {
       BoardView view{at(t - o_.time_offset_s + late_s), c, {}};
       for (int i = 0; i < out_.input.board.corner_count(); ++i)
-        if (const auto pixel = seen(motion, t, c, i)) {
+        if (const auto pixel = seen(motion, t + c * o_.later_s, c, i)) {
           Vec2 px = *pixel;
           px += Vec2{blur * o_.corner_sigma_px * rng_.normal(), blur * o_.corner_sigma_px * rng_.normal()};
           if (rng_.uniform() < o_.outlier_share) px += Vec2{20 * rng_.normal(), 20 * rng_.normal()};

@@ -27,9 +27,13 @@ int ImuCameraProblem::columns(int index, int count) {
   return begin;
 }
 
+double ImuCameraProblem::taken_s(const CalibrationView& view) const {
+  return view.t_s + state_.time_offset_s + state_.later_s[static_cast<std::size_t>(view.camera)] + state_.line_delay_s * view.row;
+}
+
 ImuCameraProblem::ViewMotion ImuCameraProblem::view_motion(const CalibrationView& view, SplineJacobian* J) const {
   const Pose<B, Cn>& T_BC = state_.T_BC[static_cast<std::size_t>(view.camera)];
-  const SplineMotion m = state_.path.at(view.t_s + state_.time_offset_s + state_.line_delay_s * view.row, J);
+  const SplineMotion m = state_.path.at(taken_s(view), J);
   ViewMotion out{m.T_TB, (m.T_TB * T_BC).inverse(), Vec6::Zero()};
   out.rate << out.T_CT.q * (m.v_TB + m.T_TB.q * m.w_TB_B.cross(T_BC.p)), T_BC.q.conjugate() * m.w_TB_B;
   return out;
@@ -121,6 +125,7 @@ void ImuCameraProblem::view_columns(const CalibrationView& view, const ViewMotio
   J_.block<3, 3>(3, camera + 3).setIdentity();
   J_.block<6, 1>(0, columns(layout_.time_offset, 1)) = motion.rate;
   if (layout_.line_delay >= 0) J_(6, columns(layout_.line_delay, 1)) = 1;
+  if (layout_.later >= 0 && view.camera > 0) J_.block<6, 1>(0, columns(layout_.later + view.camera - 1, 1)) = motion.rate;
 }
 
 double ImuCameraProblem::add_view(const CalibrationView& view, bool build) {

@@ -87,6 +87,22 @@ TEST(ImuCamera, FindsAnOffsetOfSecondsAndASecondCameraAlone) {
   expect_truth(r, calibrate_imu_camera(r.input, {}), 0.8e-3, 0.01 * kDegree, 0.03e-3);
 }
 
+TEST(ImuCamera, ATimeOffsetOfEachCamera) {
+  HandHeldOptions o = short_recording();
+  o.cameras = 3, o.later_s = 0.007;
+  HandHeldRecording r = hand_held(o, 9);
+  r.input.T_CnC0.clear();
+  const Result<CameraImuResult> found = calibrate_imu_camera(r.input, {.camera_offsets = true});
+  expect_truth(r, found, 0.8e-3, 0.01 * kDegree, 0.03e-3);
+  EXPECT_EQ(found->cameras[0].later_s, 0);
+  for (std::size_t c = 1; c < 3; ++c) {
+    const CameraOnImu& camera = found->cameras[c];
+    EXPECT_LT(camera.later_sigma_s, 0.05e-3);
+    EXPECT_NEAR(camera.later_s, o.later_s * static_cast<double>(c), 3.5 * camera.later_sigma_s) << "camera " << c;
+  }
+  EXPECT_LT(found->image_factor, 1.2);
+}
+
 TEST(ImuCamera, BearsWhatRecordingsBring) {
   HandHeldOptions o = short_recording();
   o.outlier_share = 0.02, o.blur_share = 0.15, o.dropped_share = 0.03, o.spike_share = 0.002;

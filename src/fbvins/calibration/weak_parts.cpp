@@ -90,6 +90,10 @@ void add_imu(const CameraImuResult& imu, const CertaintyAims& aims, std::vector<
   for (std::size_t k = 0; k < imu.cameras.size(); ++k) add_mounting(imu, k, aims, out);
   out.push_back({"the time offset", "ms", 1e3 * imu.time_offset_sigma_s, 1e3 * aims.time_offset_s,
                  "turn faster, and change the direction more often"});
+  for (std::size_t k = 1; k < imu.cameras.size(); ++k)
+    if (const double sigma_s = imu.cameras[k].later_sigma_s; sigma_s > 0)
+      out.push_back({fmt::format("the time offset of cam{}", k), "ms", 1e3 * sigma_s, 1e3 * aims.time_offset_s,
+                     "turn faster, and change the direction more often"});
   if (imu.line_delay_sigma_s > 0)
     out.push_back({"the line delay", "us", 1e6 * imu.line_delay_sigma_s, 1e6 * aims.line_delay_s,
                    "turn faster, about the camera's x and y axes"});

@@ -3,24 +3,23 @@
 
 #include <algorithm>
 
-#include "fbvins/geometry/so3.hpp"
-
 namespace fbvins {
 namespace {
 
 constexpr double kDistance_m = 3;
 /// Of each side of the image.
 constexpr int kSamples = 16;
-constexpr double kMostTurned_rad = 0.785;
 constexpr double kLeastBaseline_m = 1e-3;
 constexpr double kLeastOverlap = 1.0 / 3;
+/// A camera whose partner sees less of what it sees leads as well.
+constexpr double kWholeOverlap = 0.7;
 
 }  // namespace
 
 double overlap(const StereoRig& rig, int first, int second) {
   const Camera &from = rig.camera(first), &to = rig.camera(second);
   const Pose<C0, C0> T_to_from = rig.T_BC(second).inverse() * rig.T_BC(first);
-  if (T_to_from.p.norm() < kLeastBaseline_m || so3_log(T_to_from.q).norm() > kMostTurned_rad) return 0;
+  if (T_to_from.p.norm() < kLeastBaseline_m) return 0;
   int seen = 0, all = 0;
   for (int y = 0; y < kSamples; ++y)
     for (int x = 0; x < kSamples; ++x) {
@@ -49,6 +48,14 @@ std::vector<CameraGroup> camera_groups(const StereoRig& rig) {
     if (group.second) taken[static_cast<std::size_t>(*group.second)] = true;
     groups.push_back(group);
   }
+  return groups;
+}
+
+std::vector<CameraGroup> leading_groups(const StereoRig& rig) {
+  const std::vector<CameraGroup> once = camera_groups(rig);
+  std::vector<CameraGroup> groups = once;
+  for (const CameraGroup& group : once)
+    if (group.second && overlap(rig, *group.second, group.first) < kWholeOverlap) groups.push_back({*group.second, group.first});
   return groups;
 }
 

@@ -56,11 +56,32 @@ TEST(CameraGroups, ACameraWithoutAPartnerIsAlone) {
   EXPECT_EQ(numbers(with_one_camera(rig)), (Numbers{{0, -1}}));
 }
 
-TEST(CameraGroups, NoDepthAcrossImagesThatAreTurned) {
+TEST(CameraGroups, ImagesThatAreTurnedOverlap) {
   StereoRig rig = two_pairs();
   rig.more.clear();
-  rig.T_BC1.q = so3_exp(Vec3(0, 0, std::numbers::pi / 2));
+  rig.T_BC1.q = so3_exp(Vec3(0, 0, std::numbers::pi));
+  EXPECT_GT(overlap(rig, 0, 1), 0.8);
+  EXPECT_EQ(numbers(rig), (Numbers{{0, 1}}));
+}
+
+TEST(CameraGroups, NoDepthAtOnePlace) {
+  StereoRig rig = two_pairs();
+  rig.more.clear();
+  rig.T_BC1.p = Vec3(1e-4, 0, 0);
   EXPECT_EQ(overlap(rig, 0, 1), 0);
+}
+
+TEST(CameraGroups, OfAPairThatSharesHalfItsViewBothLead) {
+  const auto leaders = [](const StereoRig& rig) {
+    Numbers out;
+    for (const CameraGroup& group : leading_groups(rig)) out.emplace_back(group.first, group.second.value_or(-1));
+    return out;
+  };
+  StereoRig rig = two_pairs();
+  EXPECT_EQ(leaders(rig), (Numbers{{0, 1}, {2, 3}}));
+  rig.T_BC1.q = so3_exp(Vec3(0, 0.6, 0));  // 34 of 80 degrees to the right
+  EXPECT_EQ(numbers(rig), (Numbers{{0, 1}, {2, 3}}));
+  EXPECT_EQ(leaders(rig), (Numbers{{0, 1}, {2, 3}, {1, 0}}));
 }
 
 TEST(CameraGroups, AGroupIsARigOfItsOwn) {

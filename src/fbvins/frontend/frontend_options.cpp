@@ -30,17 +30,19 @@ Options shared_by(Options options, std::size_t groups) {
   return options;
 }
 
-/// `lead(rig, options)`: the frontend for a rig whose left camera leads; with a pair, either of its cameras can. Each group of
-/// cameras has its own.
+/// `lead(rig, options)`: the frontend for a rig whose left camera leads; with a pair whose right one does not lead anyway, either
+/// of its cameras can. Each group of cameras has its own.
 template <class Options, class Lead>
 std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, const Options& of_rig, Lead&& lead_with) {
-  const std::vector<CameraGroup> groups = camera_groups(rig);
+  const std::vector<CameraGroup> groups = leading_groups(rig);
+  const auto leads = [&](int camera) { return std::ranges::find(groups, camera, &CameraGroup::first) != groups.end(); };
   const Options options = shared_by(of_rig, groups.size());
   const auto lead = [&](const StereoRig& cameras) { return lead_with(cameras, options); };
   std::vector<std::unique_ptr<Frontend>> frontends;
   for (const CameraGroup& group : groups) {
     const StereoRig cameras = rig_of(rig, group);
-    if (group.second) frontends.push_back(std::make_unique<EitherCamera>(cameras, lead(cameras), lead(mirrored(cameras))));
+    if (group.second && !leads(*group.second))
+      frontends.push_back(std::make_unique<EitherCamera>(cameras, lead(cameras), lead(mirrored(cameras))));
     else frontends.push_back(lead(cameras));
   }
   if (groups.size() == 1) return std::move(frontends.front());

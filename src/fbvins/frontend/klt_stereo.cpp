@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/klt_stereo.hpp"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 
@@ -22,11 +24,48 @@ constexpr double kEpipolar_px = 1.5;
 constexpr double kNearerThanSearched = 1.2;
 /// Negative disparities down to this are taken as points at infinity, not as wrong.
 constexpr double kInfinity_px = 1.0;
+/// Patches of images that are turned against each other by less, rad, are matched as they are.
+constexpr double kLeastTurned_rad = 0.5;
+/// Of each side of the image.
+constexpr int kSamples = 16;
+
+/// The patch around a feature as the right camera sees it, which is turned by R_rl and where its depth is `depth_ratio` times
+/// that in the left one.
+PatchReference seen_from_right(PatchReference patch, const Mat3& R_rl, double depth_ratio) {
+  patch.carry(R_rl, depth_ratio);
+  return patch;
+}
+
+/// Whether a far thing that both cameras see stands turned in one image against the other, somewhere.
+bool images_are_turned(const StereoRig& rig) {
+  if (!rig.has_right()) return false;
+  const Mat3 R_rl = rig.T_C1C0().R();
+  for (int y = 0; y < kSamples; ++y)
+    for (int x = 0; x < kSamples; ++x) {
+      const Vec2 left_px((x + 0.5) * rig.left.width() / kSamples, (y + 0.5) * rig.left.height() / kSamples);
+      const auto normalised = rig.left.undistort(left_px);
+      if (!normalised || rig.left.hidden(left_px, 0)) continue;
+      const Vec3 p_right = R_rl * normalised->homogeneous();
+      const auto right_px = rig.right.project(p_right);
+      if (!right_px || !rig.right.inside(*right_px)) continue;
+      PatchReference patch;
+      Mat2 J_pixel_normalised;
+      rig.left.distort(*normalised, &J_pixel_normalised);
+      patch.J_normalised_pixel_then = J_pixel_normalised.inverse();
+      const Mat2 J = seen_from_right(patch, R_rl, p_right.z()).warp(rig.right, p_right.hnormalized());
+      if (std::abs(std::atan2(J(1, 0) - J(0, 1), J(0, 0) + J(1, 1))) > kLeastTurned_rad) return true;
+    }
+  return false;
+}
 
 }  // namespace
 
 KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, double min_depth_m)
-    : min_depth_m_(min_depth_m), camera_right_(rig.right), focal_px_(rig.right.focal_px()) {
+    : min_depth_m_(min_depth_m),
+      camera_left_(rig.left),
+      camera_right_(rig.right),
+      turned_(images_are_turned(rig)),
+      focal_px_(rig.right.focal_px()) {
   place(rig.T_C1C0());
 }
 
@@ -74,17 +113,21 @@ StereoFailure KltStereoMatcher::check_geometry(const Vec2& left_normalised, Ster
   return StereoFailure::none;
 }
 
+bool KltStereoMatcher::place_in_right(const Vec2& px, const Vec2& left_normalised, StereoMatch& match) const {
+  if (!visible_in_right(camera_right_, px)) return false;
+  match.px = px;
+  const auto normalised = camera_right_.undistort(px);
+  if (!normalised) return false;
+  match.normalised = *normalised;
+  match.failure = check_geometry(left_normalised, match);
+  return match.failure == StereoFailure::none;
+}
+
 StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
                                      const Vec2& start_px, int coarsest, const Pyramid& left, const Pyramid& right) {
   StereoMatch match;
   const KltResult found = klt_align(patch, right, start_px, coarsest, 0);
-  if (!found.ok() || !visible_in_right(camera_right_, found.px)) return match;
-  match.px = found.px;
-  const auto normalised = camera_right_.undistort(found.px);
-  if (!normalised) return match;
-  match.normalised = *normalised;
-  match.failure = check_geometry(left_normalised, match);
-  if (match.failure != StereoFailure::none) return match;
+  if (!found.ok() || !place_in_right(found.px, left_normalised, match)) return match;
   scratch_.cut(right, found.px, 0, 0);
   const KltResult back = klt_align(scratch_, left, left_px, 0, 0, kConvergedCheck_px);
   if (!back.ok() || (back.px - left_px).norm() > kForwardBackward_px) match.failure = StereoFailure::check;
@@ -93,6 +136,7 @@ StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_
 
 StereoMatch KltStereoMatcher::match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
                                     std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right) {
+  if (turned_) return match_turned(left_px, left_normalised, inverse_depth, left, right);
   StereoMatch match;
   if (inverse_depth) {
     if (const auto start = project(left_normalised, *inverse_depth))
@@ -101,6 +145,56 @@ StereoMatch KltStereoMatcher::match(const KltTemplate& patch, const Vec2& left_p
   }
   if (const auto start = search(patch, left_normalised, right))
     match = refine(patch, left_px, left_normalised, *start, kSearchLevel, left, right);
+  return match;
+}
+
+StereoMatch KltStereoMatcher::match_turned(const Vec2& left_px, const Vec2& left_normalised, std::optional<double> inverse_depth,
+                                           const Pyramid& left, const Pyramid& right) {
+  StereoMatch match;
+  PatchReference patch;
+  if (!patch.take(left, left_px, camera_left_, left_normalised)) return match;
+  if (inverse_depth) match = refine_turned(patch, left_px, left_normalised, *inverse_depth, left, right);
+  if (match.failure == StereoFailure::none) return match;
+  if (const auto found = search_turned(patch, left_normalised, right))
+    match = refine_turned(patch, left_px, left_normalised, *found, left, right);
+  return match;
+}
+
+/// The inverse depth of the best correlation.
+std::optional<double> KltStereoMatcher::search_turned(const PatchReference& patch, const Vec2& left_normalised,
+                                                      const Pyramid& right) {
+  const Vec3 far_ray = R_rl_ * left_normalised.homogeneous();
+  const auto far = project(left_normalised, 0), near = project(left_normalised, 1 / min_depth_m_);
+  if (!far || !near) return std::nullopt;
+  const PatchReference seen = seen_from_right(patch, R_rl_, far_ray.z());
+  if (!scratch_.cut_warped(seen.patch, seen.warp(camera_right_, far_ray.hnormalized()).inverse())) return std::nullopt;
+  const int steps = std::clamp(static_cast<int>((*near - *far).norm()) + 1, 1, kMostSteps);
+  float best = static_cast<float>(kMinSearchCorrelation);
+  std::optional<double> best_inverse_depth;
+  for (int i = 0; i <= steps; ++i) {
+    const double rho = i / (steps * min_depth_m_);
+    const auto px = project(left_normalised, rho);
+    if (!px || !visible_in_right(camera_right_, *px)) continue;
+    const float correlation = klt_correlation(scratch_.levels[0], right.level(0), *px);
+    if (correlation > best) best = correlation, best_inverse_depth = rho;
+  }
+  return best_inverse_depth;
+}
+
+StereoMatch KltStereoMatcher::refine_turned(const PatchReference& patch, const Vec2& left_px, const Vec2& left_normalised,
+                                            double inverse_depth, const Pyramid& left, const Pyramid& right) {
+  StereoMatch match;
+  const Vec3 p_right = R_rl_ * left_normalised.homogeneous() + inverse_depth * p_rl_;
+  const auto start = camera_right_.project(p_right);
+  if (!start || !visible_in_right(camera_right_, *start)) return match;
+  const PatchReference seen = seen_from_right(patch, R_rl_, p_right.z());
+  const KltResult found = refiner_.refine(seen, right, *start, camera_right_, p_right.hnormalized());
+  if (!found.ok() || !place_in_right(found.px, left_normalised, match)) return match;
+  PatchReference back_patch;
+  const bool cut = back_patch.take(right, found.px, camera_right_, match.normalised);
+  if (cut) back_patch.carry(R_rl_.transpose(), 1 / p_right.z());
+  const KltResult back = cut ? refiner_.refine(back_patch, left, left_px, camera_left_, left_normalised) : KltResult{};
+  if (!back.ok() || (back.px - left_px).norm() > kForwardBackward_px) match.failure = StereoFailure::check;
   return match;
 }
 

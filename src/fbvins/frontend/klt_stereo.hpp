@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds a feature of the left image in the right one: from its last depth, or by a correlation search along the
-// epipolar curve on a coarse level; then Lucas-Kanade, backward check and epipolar check.
-// One instance is used by one thread at a time (it reuses a template as scratch).
+// epipolar curve on a coarse level; then Lucas-Kanade, backward check and epipolar check. Where the images are turned against
+// each other the patch is turned too, and the search is on the finest level. One instance is used by one thread at a time (it
+// reuses a template as scratch).
 //
 //   KltStereoMatcher matcher(rig, 0.35);
 //   auto match = matcher.match(patch, px, normalised, inverse_depth, left, right);
@@ -10,7 +11,7 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/features/klt.hpp"
+#include "fbvins/features/patch_refine.hpp"
 #include "fbvins/features/pyramid.hpp"
 
 namespace fbvins {
@@ -48,15 +49,24 @@ class KltStereoMatcher {
   std::optional<Vec2> search(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const;
   StereoMatch refine(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised, const Vec2& start_px,
                      int coarsest, const Pyramid& left, const Pyramid& right);
+  StereoMatch match_turned(const Vec2& left_px, const Vec2& left_normalised, std::optional<double> inverse_depth,
+                           const Pyramid& left, const Pyramid& right);
+  std::optional<double> search_turned(const PatchReference& reference, const Vec2& left_normalised, const Pyramid& right);
+  StereoMatch refine_turned(const PatchReference& reference, const Vec2& left_px, const Vec2& left_normalised,
+                            double inverse_depth, const Pyramid& left, const Pyramid& right);
+  /// Where the ray is found in the right image, if that shows it; false else.
+  bool place_in_right(const Vec2& px, const Vec2& left_normalised, StereoMatch& match) const;
   /// Epipolar distance and depth of a match.
   StereoFailure check_geometry(const Vec2& left_normalised, StereoMatch& match) const;
 
   double min_depth_m_;
-  Camera camera_right_;
+  Camera camera_left_, camera_right_;
+  bool turned_;
   Mat3 R_rl_;  // C1 <- C0
   Vec3 p_rl_;
   double focal_px_;
   KltTemplate scratch_;
+  PatchRefiner refiner_;
 };
 
 }  // namespace fbvins
