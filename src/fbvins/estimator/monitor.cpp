@@ -34,7 +34,8 @@ constexpr double kLasting_sigma = 1.5, kLastingScale = 0.4, kLasting_s = 0.5;
 /// What is left of a sudden drift does not last: it is forgotten after this time.
 constexpr double kForgotten_s = 1;
 /// The window's turns against the readings', in standard deviations, beyond what axes that are off by this share of the turn
-/// explain: up to 3 where all is well, and up to 7 where images are rendered along a measured trajectory. From the first on they contradict each other, until they are below the second.
+/// explain: up to 3 where all is well, up to 6.4 where images are rendered along a measured trajectory. From the first on they
+/// contradict each other, until they are below the second.
 constexpr double kTurn_sigma = 7, kTurnOver_sigma = 3, kTurnScale = 0.002;
 /// By then the pose has moved by about as much, in each direction.
 constexpr double kTurnedAway_m = 0.1;
