@@ -11,15 +11,9 @@ import subprocess
 import sys
 import tempfile
 
-os.environ["MAVLINK20"] = "1"
-try:
-    import pymavlink  # noqa: F401
-except ImportError:
-    if len(sys.argv) > 2 and os.path.exists(sys.argv[2]) and sys.argv[2] != sys.executable:
-        os.execv(sys.argv[2], [sys.argv[2], *sys.argv[:2]])
-    print("SKIPPED: pymavlink is not installed; `./dev test` puts it into build/venv")
-    sys.exit(77)
+from other_python import needs
 
+needs(["pymavlink"], at=2)
 from px4_simulator import Px4  # noqa: E402
 
 STEP_US = 5000

@@ -14,16 +14,10 @@ import subprocess
 import sys
 import tempfile
 
-os.environ["MAVLINK20"] = "1"
-try:
-    import numpy as np
-    import pymavlink  # noqa: F401
-except ImportError:
-    if len(sys.argv) > 3 and os.path.exists(sys.argv[3]) and sys.argv[3] != sys.executable:
-        os.execv(sys.argv[3], [sys.argv[3], *sys.argv[:3]])
-    print("SKIPPED: pymavlink and numpy are not installed; `./dev test` puts them into build/venv")
-    sys.exit(77)
+from other_python import needs
 
+needs(["numpy", "pymavlink"], at=3)
+import numpy as np  # noqa: E402
 from flight_data import MOUNTING, Recording, Trajectory, about_z, rotation  # noqa: E402
 from px4_simulator import Px4  # noqa: E402
 
