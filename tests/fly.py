@@ -50,7 +50,7 @@ def main():
         assert first["flight.csv"] != other["flight.csv"], "another seed is the same flight"
         print("same bytes with and without threads, others with another seed")
 
-        fbvins(program, "run", root / "first" / "recording", "--out", root / "again", "--quiet")
+        fbvins(program, "run", root / "first" / "recording", "--config", root / "first" / "config.yaml", "--out", root / "again", "--quiet")
         again = (root / "again" / "trajectory.csv").read_text(encoding="utf-8").splitlines()
         flown = first["trajectory.csv"].decode().splitlines()
         assert len(flown) > 150 and flown == again[:len(flown)], "`run` on the recording gives other estimates than the flight used"

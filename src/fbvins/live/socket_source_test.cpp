@@ -234,7 +234,7 @@ TEST_F(SocketSourceTest, WrongHellosAreRefusedWithTheReason) {
   hello = hello_message(nullptr);
   hello.width_px = 60;
   EXPECT_EQ(refusal(hello, memory), "images of 60 x 48 pixels, the calibration is for 64 x 48");
-  EXPECT_TRUE(inbox_.hears("a sender: the sender speaks version 2.4"));
+  EXPECT_TRUE(inbox_.hears("a sender: the sender speaks version 2.5"));
   expect_service();
 }
 
