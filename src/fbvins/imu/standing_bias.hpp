@@ -3,6 +3,7 @@
 // them apart (docs/derivations/alignment.md, A22-A24). Pure function.
 #pragma once
 
+#include "fbvins/imu/nav_state.hpp"
 #include "fbvins/types/imu_state.hpp"
 
 namespace fbvins {
