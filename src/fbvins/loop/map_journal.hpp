@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a flight adds to a map's file, in a journal beside it (FILE.journal), so that keeping the map in flight costs as much as
-// is new, however large the file is; whoever opens the file has both (docs/derivations/loop.md, "The journal"). The class is a
-// value of one flight; one thread at a time.
+// is new, however large the file is; every reader of the file reads both (docs/derivations/loop.md, "The journal"). A value of
+// one flight; one thread at a time.
 //
 //   MapJournal journal;
 //   Result<std::string> news = journal.news(map);                       // every half minute
