@@ -307,7 +307,7 @@ void bind_system(nb::module_& m) {
           "The same of a tag that a detector of yours saw: position (3,) in m and orientation (4,) w, x, y, z of the tag in B, "
           "covariance (6, 6) of (position in B, rotation in the tag); where it hangs in the building, or None: then it is a landmark, "
           "which says where the vehicle is when it is seen again, in this flight or in another. The tag's frame: origin in its "
-          "middle, x to the right and y upwards as a viewer of the upright tag sees it, z to him.")
+          "middle, x to the right and y upwards as a viewer of the upright tag sees it, z towards the viewer.")
       .def("finish", &PySystem::finish,
            "Processes all waiting events and ends; afterwards only results already waiting for poll() are left.")
       .def("poll", &PySystem::poll, "The Odometry of all images processed since the last call; empty with on_odometry.")

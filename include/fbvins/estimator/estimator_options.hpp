@@ -51,8 +51,8 @@ struct StandingOptions {
   template <class V>
   void visit(V&& v) {
     v("tilt_rad", tilt_rad, "rad",
-      "at its first start the vehicle stands level to this standard deviation, the IMU's mounting included; 0: it may stand anyhow",
-      0.0, 0.2);
+      "at its first start the vehicle stands level to this standard deviation, the IMU's mounting included; 0: not known", 0.0,
+      0.2);
     v("up_x", up_x, "", "the vehicle's up in the IMU's frame, any length", -1.0, 1.0);
     v("up_y", up_y, "", "likewise", -1.0, 1.0);
     v("up_z", up_z, "", "likewise", -1.0, 1.0);

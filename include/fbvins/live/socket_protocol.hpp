@@ -166,7 +166,8 @@ typedef struct FbvinsSocketPosition {
 } FbvinsSocketPosition;
 
 /// A tag that a detector of the sender's saw (docs/maps.md, Anchors). Poses are a position in m and an orientation w, x, y, z;
-/// the tag's frame has its origin in its middle, x to the right and y upwards as a viewer of the upright tag sees it, z to him.
+/// the tag's frame has its origin in its middle, x to the right and y upwards as a viewer of the upright tag sees it, z towards
+/// the viewer.
 typedef struct FbvinsSocketTag {
   FbvinsSocketHeader header;
   int64_t t_ns;  ///< of the cameras' clock

@@ -19,7 +19,8 @@ namespace fbvins {
 
 /// The building's frame, z up: that in which anchors are surveyed.
 struct A {};
-/// The frame of an AprilTag: origin in its middle, x to the right and y upwards as a viewer of the upright tag sees it, z to him.
+/// The frame of an AprilTag: origin in its middle, x to the right and y upwards as a viewer of the upright tag sees it, z towards
+/// the viewer.
 struct Tag {};
 
 /// Where a point of the body is. All stamps are on the images' clock.
