@@ -21,7 +21,8 @@ FrameList frames(const Vec3& wrong_radps, double accuracy_scale = 1) {
     f.state = motion.state<G>(f.t.seconds());
     if (k > 0) {
       Preintegration imu(noise, {});
-      imu.integrate(motion.segment(f.t - Duration::from_seconds(0.1), f.t, Duration::from_seconds(0.005), {wrong_radps, {}}));
+      imu.integrate(
+          motion.segment(f.t - Duration::from_seconds(0.1), f.t, Duration::from_seconds(0.005), {.gyro_radps = wrong_radps}));
       f.imu = std::make_shared<const Preintegration>(std::move(imu));
     }
     out.add(std::move(f));
