@@ -78,7 +78,7 @@ void BoardWatch::look_at(const StereoFrame& frame, BoardDetector& detector) {
   for (int k = 0; k < 2 + static_cast<int>(frame.more.size()); ++k) {
     const std::shared_ptr<const Image> image = frame.image(k);
     if (!image) continue;
-    const BoardSighting seen = detector.find(image->view());
+    const BoardDetection seen = detector.find(image->view());
     bool try_mirrored = false;
     {
       const std::lock_guard lock(mutex_);
@@ -89,7 +89,7 @@ void BoardWatch::look_at(const StereoFrame& frame, BoardDetector& detector) {
     const Time t = frame.t + frame.offsets.of(k);
     const std::lock_guard lock(mutex_);
     ++look_.images;
-    sightings_.add(k, t, image->width(), seen, mirrored);
+    recent_views_.add(k, t, image->width(), seen, mirrored);
     recorded_.detections.sizes.emplace(k, ImageSize{image->width(), image->height()});
     if (static_cast<int>(look_.cameras.size()) <= k) look_.cameras.resize(static_cast<std::size_t>(k) + 1);
     if (Picture& picture = look_.cameras[static_cast<std::size_t>(k)]; !picture.image || picture.t < t)
@@ -103,7 +103,7 @@ BoardWatch::Recorded BoardWatch::recorded() const {
   {
     const std::lock_guard lock(mutex_);
     out = recorded_;
-    out.now = sightings_.now();
+    out.now = recent_views_.now();
   }
   std::ranges::sort(out.detections.views,
                     [](const BoardView& a, const BoardView& b) { return a.t != b.t ? a.t < b.t : a.camera < b.camera; });
@@ -113,7 +113,7 @@ BoardWatch::Recorded BoardWatch::recorded() const {
 BoardWatch::Look BoardWatch::look() const {
   const std::lock_guard lock(mutex_);
   Look out = look_;
-  out.advice = sightings_.advice();
+  out.advice = recent_views_.advice();
   return out;
 }
 

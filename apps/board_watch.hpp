@@ -14,8 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "fbvins/calibration/board_sightings.hpp"
 #include "fbvins/calibration/detections_file.hpp"
+#include "fbvins/calibration/recent_board_views.hpp"
 #include "fbvins/live/source.hpp"
 
 namespace fbvins::app {
@@ -48,7 +48,7 @@ class BoardWatch final : public SensorInput {
     int images = 0;                ///< that were looked at, of all cameras
     int left_out = 0;              ///< frames that came and were not looked at
     double duration_s = 0;         ///< from the first frame to the newest
-    std::string advice;            ///< BoardSightings::advice()
+    std::string advice;            ///< RecentBoardViews::advice()
   };
   Look look() const;
 
@@ -64,7 +64,7 @@ class BoardWatch final : public SensorInput {
   bool finished_ = false;
   Recorded recorded_;
   Look look_;
-  BoardSightings sightings_;
+  RecentBoardViews recent_views_;
   int mirror_tries_ = 0;
   std::optional<Time> first_;
   std::vector<std::thread> threads_;  ///< last: they use the members above

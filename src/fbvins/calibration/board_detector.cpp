@@ -14,7 +14,7 @@ namespace {
 constexpr double kSmallestTag_px = 16;
 constexpr double kLargestRadius_px = 6;
 
-double shortest_side_px(const TagSighting& tag) {
+double shortest_side_px(const TagDetection& tag) {
   double shortest = 1e9;
   for (int k = 0; k < 4; ++k) shortest = std::min(shortest, (tag.corners[k] - tag.corners[(k + 1) % 4]).norm());
   return shortest;
@@ -34,11 +34,11 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
   return BoardDetector(board, *std::move(detector));
 }
 
-BoardSighting BoardDetector::find(const ImageView& image) {
-  BoardSighting out;
-  const std::vector<TagSighting> tags = detector_.find(image, board_.columns * board_.rows / 2);
+BoardDetection BoardDetector::find(const ImageView& image) {
+  BoardDetection out;
+  const std::vector<TagDetection> tags = detector_.find(image, board_.columns * board_.rows / 2);
   for (std::size_t i = 0; i < tags.size(); ++i) {
-    const TagSighting& tag = tags[i];
+    const TagDetection& tag = tags[i];
     if (tag.id >= board_.columns * board_.rows) {
       ++out.foreign_tags;
       continue;

@@ -2,7 +2,7 @@
 // The corners of a board in an image. One thread a detector.
 //
 //   Result<BoardDetector> detector = BoardDetector::create(board);
-//   BoardSighting seen = detector->find(image.view());
+//   BoardDetection seen = detector->find(image.view());
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace fbvins {
 
-struct BoardSighting {
+struct BoardDetection {
   std::vector<BoardCorner> corners;  ///< by index
   int tags = 0;                      ///< of the board
   int foreign_tags = 0;              ///< with a number that the board does not have
@@ -25,7 +25,7 @@ class BoardDetector {
   /// An error where the kind of board cannot be found in images.
   static Result<BoardDetector> create(const Board& board);
 
-  BoardSighting find(const ImageView& image);
+  BoardDetection find(const ImageView& image);
   /// Whether tags are found in the mirrored image: printed mirrored, or a mirrored image.
   bool finds_mirrored(const ImageView& image);
 

@@ -69,7 +69,7 @@ TEST(BoardDetector, WhatIsPrintedIsWhatIsFound) {
       for (int x = static_cast<int>(std::ceil(r.x - 0.5)); x < r.x + r.width - 0.5; ++x)
         if (x >= 0 && y >= 0 && x < image.width() && y < image.height()) image.at(x, y) = r.black ? 0 : 255;
   BoardDetector detector = *BoardDetector::create(kBoard);
-  const BoardSighting seen = detector.find(image.view());
+  const BoardDetection seen = detector.find(image.view());
   EXPECT_EQ(seen.tags, 12);
   EXPECT_EQ(seen.corners.size(), 48u);
   for (const BoardCorner& corner : seen.corners) {
@@ -97,7 +97,7 @@ TEST(BoardDetector, TagsOfOtherBoardsAndDoubleTagsAreCounted) {
   Image twice(2 * image.width(), image.height());
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < twice.width(); ++x) twice.at(x, y) = image.at(x % image.width(), y);
-  const BoardSighting seen = BoardDetector::create(kBoard)->find(twice.view());
+  const BoardDetection seen = BoardDetector::create(kBoard)->find(twice.view());
   EXPECT_GE(seen.twice, 10);
   EXPECT_TRUE(seen.corners.empty());
 }

@@ -14,7 +14,7 @@ namespace {
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
-struct Sighting {
+struct PointOnRay {
   Vec3 p_T;
   Vec3 ray_C;
 };
@@ -25,19 +25,19 @@ struct PlaneScale {
   double per_m = 1;
 };
 
-PlaneScale scale_of(const std::vector<Sighting>& sightings) {
+PlaneScale scale_of(const std::vector<PointOnRay>& points) {
   PlaneScale out;
-  for (const Sighting& s : sightings) out.centre += s.p_T.head<2>() / static_cast<double>(sightings.size());
+  for (const PointOnRay& s : points) out.centre += s.p_T.head<2>() / static_cast<double>(points.size());
   double square = 0;
-  for (const Sighting& s : sightings) square += (s.p_T.head<2>() - out.centre).squaredNorm();
-  out.per_m = std::sqrt(static_cast<double>(sightings.size()) / std::max(square, 1e-12));
+  for (const PointOnRay& s : points) square += (s.p_T.head<2>() - out.centre).squaredNorm();
+  out.per_m = std::sqrt(static_cast<double>(points.size()) / std::max(square, 1e-12));
   return out;
 }
 
 /// H with ray ~ H (x, y, 1): the smallest singular vector of [ray]x H (x, y, 1) = 0. nullopt where corners lie in a line.
-std::optional<Mat3> homography(const std::vector<Sighting>& sightings, const PlaneScale& scale) {
+std::optional<Mat3> homography(const std::vector<PointOnRay>& points, const PlaneScale& scale) {
   Mat9 sum = Mat9::Zero();
-  for (const Sighting& s : sightings) {
+  for (const PointOnRay& s : points) {
     const Vec2 xy = scale.per_m * (s.p_T.head<2>() - scale.centre);
     const Mat3 cross = hat(s.ray_C);
     Eigen::Matrix<double, 3, 9> A;
@@ -49,9 +49,9 @@ std::optional<Mat3> homography(const std::vector<Sighting>& sightings, const Pla
   return Mat3(Eigen::Map<const Mat3>(Eigen::Matrix<double, 9, 1>(eigen.eigenvectors().col(0)).data()));
 }
 
-std::optional<Pose<Cn, T>> pose_of(Mat3 H, const PlaneScale& scale, const std::vector<Sighting>& sightings) {
+std::optional<Pose<Cn, T>> pose_of(Mat3 H, const PlaneScale& scale, const std::vector<PointOnRay>& points) {
   double ahead = 0;
-  for (const Sighting& s : sightings) {
+  for (const PointOnRay& s : points) {
     const Vec2 xy = scale.per_m * (s.p_T.head<2>() - scale.centre);
     ahead += s.ray_C.dot(H * Vec3(xy.x(), xy.y(), 1)) > 0 ? 1 : -1;
   }
@@ -150,15 +150,15 @@ Pose<Cn, T> tilted_back(const Pose<Cn, T>& pose, const Board& board, const std::
 }  // namespace
 
 std::optional<PosedBoard> find_board_pose(const Camera& camera, const Board& board, const std::vector<BoardCorner>& corners) {
-  std::vector<Sighting> sightings;
+  std::vector<PointOnRay> points;
   for (const BoardCorner& corner : corners)
     if (const auto n = camera.undistort(corner.pixel))
-      sightings.push_back({board.corner(corner.index), Vec3(n->x(), n->y(), 1).normalized()});
-  if (sightings.size() < 4 || 2 * sightings.size() < corners.size()) return std::nullopt;
-  const PlaneScale scale = scale_of(sightings);
-  const auto H = homography(sightings, scale);
+      points.push_back({board.corner(corner.index), Vec3(n->x(), n->y(), 1).normalized()});
+  if (points.size() < 4 || 2 * points.size() < corners.size()) return std::nullopt;
+  const PlaneScale scale = scale_of(points);
+  const auto H = homography(points, scale);
   if (!H) return std::nullopt;
-  auto pose = pose_of(*H, scale, sightings);
+  auto pose = pose_of(*H, scale, points);
   if (!pose) return std::nullopt;
   constexpr double kSpread_px = 2;
   double cost = refine(camera.model(), board, corners, kSpread_px, *pose);

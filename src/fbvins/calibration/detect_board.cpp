@@ -27,7 +27,7 @@ ImageFinding look(const ListedImage& listed, const CameraRecording::Decode& deco
     return out;
   }
   out.size = {image->width(), image->height()};
-  BoardSighting seen = detector.find(image->view());
+  BoardDetection seen = detector.find(image->view());
   out.view.corners = std::move(seen.corners);
   out.tags = seen.tags;
   out.foreign_tags = seen.foreign_tags;

@@ -71,43 +71,43 @@ Image with_smaller_black(const ImageView& image) {
   return out;
 }
 
-void detect(apriltag_detector_t* detector, const ImageView& image, std::vector<TagSighting>& out) {
+void detect(apriltag_detector_t* detector, const ImageView& image, std::vector<TagDetection>& out) {
   // The library reads only, but does not say so.
   image_u8_t view{image.width, image.height, static_cast<int32_t>(image.stride), const_cast<uint8_t*>(image.data)};
   zarray_t* found = apriltag_detector_detect(detector, &view);
   for (int i = 0; i < zarray_size(found); ++i) {
     apriltag_detection_t* detection = nullptr;
     zarray_get(found, i, &detection);
-    TagSighting sighting;
-    sighting.id = detection->id;
-    for (int k = 0; k < 4; ++k) sighting.corners[k] = Vec2(detection->p[k][0] - 0.5, detection->p[k][1] - 0.5);
+    TagDetection found;
+    found.id = detection->id;
+    for (int k = 0; k < 4; ++k) found.corners[k] = Vec2(detection->p[k][0] - 0.5, detection->p[k][1] - 0.5);
     // One that was found before in the same place.
-    const bool known = std::ranges::any_of(out, [&](const TagSighting& s) {
-      return s.id == sighting.id && (s.corners[0] - sighting.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
+    const bool known = std::ranges::any_of(out, [&](const TagDetection& s) {
+      return s.id == found.id && (s.corners[0] - found.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
     });
-    if (!known) out.push_back(sighting);
+    if (!known) out.push_back(found);
   }
   apriltag_detections_destroy(found);
 }
 
 }  // namespace
 
-std::vector<TagSighting> TagDetector::find(const ImageView& image, int enough) {
-  std::vector<TagSighting> out;
+std::vector<TagDetection> TagDetector::find(const ImageView& image, int enough) {
+  std::vector<TagDetection> out;
   if (image.empty()) return out;
   // In a blurred image the tags of a grid hang together at their corners, by the squares between them, and few are found. With
   // black a pixel smaller they come apart; small tags, whose cells would vanish, are found in the image itself.
   detect(state_->detector, with_smaller_black(image).view(), out);
   if (static_cast<int>(out.size()) < enough) detect(state_->detector, image, out);
-  std::ranges::stable_sort(out, {}, &TagSighting::id);
+  std::ranges::stable_sort(out, {}, &TagDetection::id);
   return out;
 }
 
-std::vector<TagSighting> TagDetector::find_alone(const ImageView& image) {
-  std::vector<TagSighting> out;
+std::vector<TagDetection> TagDetector::find_alone(const ImageView& image) {
+  std::vector<TagDetection> out;
   if (image.empty()) return out;
   detect(state_->detector, image, out);
-  std::ranges::stable_sort(out, {}, &TagSighting::id);
+  std::ranges::stable_sort(out, {}, &TagDetection::id);
   return out;
 }
 
@@ -124,8 +124,8 @@ Error not_built() {
 struct TagDetector::State {};
 Result<TagCells> tag_cells(int) { return not_built(); }
 Result<TagDetector> TagDetector::create() { return not_built(); }
-std::vector<TagSighting> TagDetector::find(const ImageView&, int) { return {}; }
-std::vector<TagSighting> TagDetector::find_alone(const ImageView&) { return {}; }
+std::vector<TagDetection> TagDetector::find(const ImageView&, int) { return {}; }
+std::vector<TagDetection> TagDetector::find_alone(const ImageView&) { return {}; }
 
 #endif
 

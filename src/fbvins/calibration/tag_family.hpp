@@ -19,7 +19,7 @@ using TagCells = std::array<std::array<bool, 8>, 8>;
 /// The cells of a tag from 0 to 586.
 Result<TagCells> tag_cells(int id);
 
-struct TagSighting {
+struct TagDetection {
   int id = 0;
   /// Of the black square: bottom left, bottom right, top right, top left of the upright tag; centre of the first pixel at (0, 0).
   std::array<Vec2, 4> corners;
@@ -34,10 +34,10 @@ class TagDetector {
   ~TagDetector();
 
   /// By id; corners to about a pixel. Where fewer than `enough` are found in one way, another one is tried.
-  std::vector<TagSighting> find(const ImageView& image, int enough);
+  std::vector<TagDetection> find(const ImageView& image, int enough);
   /// The same of tags that stand alone, with white around: corners to some tenths of a pixel, where the lines along the edges
   /// meet.
-  std::vector<TagSighting> find_alone(const ImageView& image);
+  std::vector<TagDetection> find_alone(const ImageView& image);
 
  private:
   struct State;

@@ -55,7 +55,7 @@ TagFinder::TagFinder(const StereoRig& rig, TagSurvey survey, TagDetector detecto
       board_{BoardKind::aprilgrid, 1, 1, survey_.size_m, 0.3},
       detector_(std::move(detector)) {}
 
-std::optional<TagAnchor> TagFinder::posed(const TagSighting& seen) const {
+std::optional<TagAnchor> TagFinder::posed(const TagDetection& seen) const {
   std::vector<BoardCorner> corners;
   for (int k = 0; k < 4; ++k) {
     if ((seen.corners[k] - seen.corners[(k + 1) % 4]).norm() < kSmallest_px) return std::nullopt;
@@ -84,9 +84,9 @@ std::optional<TagAnchor> TagFinder::posed(const TagSighting& seen) const {
 std::vector<TagAnchor> TagFinder::find(const StereoFrame& frame) {
   std::vector<TagAnchor> out;
   if (!frame.left) return out;
-  const std::vector<TagSighting> all = detector_.find_alone(frame.left->view());
-  for (const TagSighting& seen : all) {
-    const auto of_id = std::ranges::count(all, seen.id, &TagSighting::id);
+  const std::vector<TagDetection> all = detector_.find_alone(frame.left->view());
+  for (const TagDetection& seen : all) {
+    const auto of_id = std::ranges::count(all, seen.id, &TagDetection::id);
     if (of_id > 1 || !survey_.T_AT.contains(seen.id)) continue;
     auto anchor = posed(seen);
     if (!anchor) continue;

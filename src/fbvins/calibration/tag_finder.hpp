@@ -28,7 +28,7 @@ class TagFinder {
 
  private:
   TagFinder(const StereoRig& rig, TagSurvey survey, TagDetector detector);
-  std::optional<TagAnchor> posed(const TagSighting& seen) const;
+  std::optional<TagAnchor> posed(const TagDetection& seen) const;
 
   Camera camera_;
   Pose<B, C0> T_BC0_;

@@ -188,7 +188,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   const std::vector<TrackedFeature> features = examine(frame, imu, predicted);
   out.imu_noise = imu.noise;
   predicted.standstill = standstill;
-  if (surfaces_.has_sensor() && std::ssize(sightings_of(window_, features, calibration_)) < kEnoughLandmarks)
+  if (surfaces_.has_sensor() && std::ssize(landmark_observations(window_, features, calibration_)) < kEnoughLandmarks)
     predicted.surfaces = surfaces_.find(predicted, window_.frames(), calibration_);
   window_.add_frame(std::move(predicted), features, calibration_);
   stats.prepare_ms = timer.lap_ms();
@@ -216,7 +216,7 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     monitor_.pass(dt);
     return frame.features;
   }
-  const Monitor::Verdict verdict = monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_,
+  const Monitor::Verdict verdict = monitor_.examine(landmark_observations(window_, frame.features, calibration_), calibration_,
                                                     predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);

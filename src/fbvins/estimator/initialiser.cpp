@@ -233,16 +233,16 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
   structure_.clear();
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (i > 0) {
-      std::vector<PointSighting> sightings;
+      std::vector<LandmarkObservation> observations;
       for (const TrackedFeature& f : frames_[i].features) {
         const auto p = points.find(f.id);
-        if (p != points.end()) sightings.push_back({p->second, &f});
+        if (p != points.end()) observations.push_back({p->second, &f});
       }
-      if (static_cast<int>(sightings.size()) < kMinStructureInliers) return false;
+      if (static_cast<int>(observations.size()) < kMinStructureInliers) return false;
       Pose<G, B> guess = poses.back();
       guess.q = guess.q * integrate_gyro(frames_[i].imu, Vec3::Zero());
-      const PoseRefinement refined = refine_pose(sightings, calibration, guess);
-      if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(sightings.size())))
+      const PoseRefinement refined = refine_pose(observations, calibration, guess);
+      if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(observations.size())))
         return false;
       poses.push_back(refined.T_GB);
     }

@@ -84,23 +84,23 @@ struct Medians {
   }
 };
 
-CameraPair pair_of(int camera, const std::vector<PointSighting>& sightings) {
-  for (const PointSighting& s : sightings)
-    if (s.feature->cameras.left == camera || s.feature->cameras.right == camera) return s.feature->cameras;
+CameraPair pair_of(int camera, const std::vector<LandmarkObservation>& observations) {
+  for (const LandmarkObservation& l : observations)
+    if (l.feature->cameras.left == camera || l.feature->cameras.right == camera) return l.feature->cameras;
   return {static_cast<std::int8_t>(camera), static_cast<std::int8_t>(camera)};
 }
 
 /// The camera that is off most, if the others are not, or else its pair, which sees the same things, if the others are not.
 /// `off(camera)`: by how much; `fits(others, this)`.
 template <class Off, class Fits>
-std::optional<CameraPair> suspects(const std::vector<PointSighting>& sightings, const Medians& at, int camera_count, Off&& off,
-                                   Fits&& fits) {
+std::optional<CameraPair> suspects(const std::vector<LandmarkObservation>& observations, const Medians& at, int camera_count,
+                                   Off&& off, Fits&& fits) {
   int worst = 0;
   for (int c = 1; c < camera_count; ++c)
     if (off(c) > off(worst)) worst = c;
   if (!at.of(worst)) return std::nullopt;
   const auto alone = static_cast<std::int8_t>(worst);
-  for (const CameraPair cameras : {CameraPair{alone, alone}, pair_of(worst, sightings)}) {
+  for (const CameraPair cameras : {CameraPair{alone, alone}, pair_of(worst, observations)}) {
     double of_others = 0;
     int others = 0;
     for (int c = 0; c < camera_count; ++c) {
@@ -113,19 +113,19 @@ std::optional<CameraPair> suspects(const std::vector<PointSighting>& sightings, 
   return std::nullopt;
 }
 
-Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, int camera_count,
+Medians medians(const std::vector<LandmarkObservation>& observations, const CameraGeometry& cameras, int camera_count,
                 const Pose<G, B>& T_GB, const Vec3& v_B) {
   const Mat3 R_BG = T_GB.R().transpose();
   Medians out;
   out.shift.fill(Vec2::Zero());
   for (int c = 0; c < camera_count; ++c) {
     std::vector<double> residuals, x, y;
-    for (const PointSighting& s : sightings) {
-      const auto [left, right] = s.feature->cameras;
+    for (const LandmarkObservation& l : observations) {
+      const auto [left, right] = l.feature->cameras;
       if (c != left && c != right) continue;
-      const std::optional<Observation>& o = c == left ? s.feature->left : s.feature->right;
+      const std::optional<Observation>& o = c == left ? l.feature->left : l.feature->right;
       if (!o) continue;
-      const Vec3 p_C = cameras.R_CB[c] * (R_BG * (s.p_G - T_GB.p) - cameras.t_BC[c] - o->displacement_B(v_B));
+      const Vec3 p_C = cameras.R_CB[c] * (R_BG * (l.p_G - T_GB.p) - cameras.t_BC[c] - o->displacement_B(v_B));
       const Vec2 r =
           p_C.z() > kMinScaledDepth ? Vec2(o->sqrt_information * (p_C.head<2>() / p_C.z() - o->normalised)) : Vec2(1e3, 1e3);
       residuals.push_back(r.norm()), x.push_back(r.x()), y.push_back(r.y());
@@ -138,11 +138,11 @@ Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometr
   return out;
 }
 
-Vec3 middle_of(const std::vector<PointSighting>& sightings) {
+Vec3 middle_of(const std::vector<LandmarkObservation>& observations) {
   Vec3 middle;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> along;
-    for (const PointSighting& s : sightings) along.push_back(s.p_G(axis));
+    for (const LandmarkObservation& l : observations) along.push_back(l.p_G(axis));
     middle(axis) = median(along);
   }
   return middle;
@@ -246,10 +246,10 @@ void Monitor::take(const Biases& now) {
   biases_ = {now};
 }
 
-Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, const Calibration& calibration,
+Monitor::Verdict Monitor::examine(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
                                   const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
   Verdict out;
-  if (sightings.size() < kFewest) {
+  if (observations.size() < kFewest) {
     blind(dt);
     return out;
   }
@@ -259,11 +259,11 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     return out;
   }
   out.noise.gyro = turning_noise_;
-  ahead_G_ = middle_of(sightings) - predicted.p;
+  ahead_G_ = middle_of(observations) - predicted.p;
   const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
   const CameraGeometry cameras(calibration);
   const int camera_count = calibration.camera_count();
-  const Medians at_prediction = medians(sightings, cameras, camera_count, predicted, v_B);
+  const Medians at_prediction = medians(observations, cameras, camera_count, predicted, v_B);
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
@@ -271,19 +271,19 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     take_agreement(excess, dt);
     return out;
   }
-  const PoseRefinement seen = refine_pose(sightings, calibration, predicted, v_B);
-  const Medians at_seen = medians(sightings, cameras, camera_count, seen.T_GB, v_B);
+  const PoseRefinement seen = refine_pose(observations, calibration, predicted, v_B);
+  const Medians at_seen = medians(observations, cameras, camera_count, seen.T_GB, v_B);
   const auto off = [&](int camera) {
     const auto c = static_cast<std::size_t>(camera);
     return excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0);
   };
   const auto fits = [&](double others, double worst) { return others < (excess < 0 ? kOther * worst : patience * kUsual_sigma); };
-  const std::optional<CameraPair> wrong = suspects(sightings, at_prediction, camera_count, off, fits);
+  const std::optional<CameraPair> wrong = suspects(observations, at_prediction, camera_count, off, fits);
   if (excess < 0 && wrong && wrong->left != wrong->right) {
     pass(dt);  // something moves before one of several pairs
     return out;
   }
-  const bool explained = seen.inliers >= kAgreeing * static_cast<double>(sightings.size()) &&
+  const bool explained = seen.inliers >= kAgreeing * static_cast<double>(observations.size()) &&
                          (excess < 0 || at_seen.worst() < kBetter * at_prediction.worst());
   if (!explained && !wrong) {
     take_unexplained(dt);

@@ -35,10 +35,10 @@ class Monitor {
 
   /// A window begins.
   void restart();
-  /// `sightings`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before,
+  /// `observations`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before,
   /// with the velocity `v_B`, which counts where not all was seen at the stamp.
-  Verdict examine(const std::vector<PointSighting>& sightings, const Calibration& calibration, const Pose<G, B>& predicted,
-                  Duration dt, const Vec3& v_B = Vec3::Zero());
+  Verdict examine(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
+                  const Pose<G, B>& predicted, Duration dt, const Vec3& v_B = Vec3::Zero());
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 

@@ -28,10 +28,10 @@ class Scene {
   }
 
   /// The points from `T_GB`; those from `first_other` on, from `other`, as if they moved; each camera from a pose of its own.
-  std::vector<PointSighting> seen(const Pose<G, B>& left, const Pose<G, B>& right, std::size_t first_other = 1000,
-                                  const Pose<G, B>& other = {}) {
+  std::vector<LandmarkObservation> seen(const Pose<G, B>& left, const Pose<G, B>& right, std::size_t first_other = 1000,
+                                        const Pose<G, B>& other = {}) {
     features_.assign(points_.size(), {});
-    std::vector<PointSighting> out;
+    std::vector<LandmarkObservation> out;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const bool moves = i >= first_other;
       features_[i].left = observe(rig.T_BC0.inverse() * ((moves ? other : left).inverse() * points_[i]));
@@ -40,10 +40,10 @@ class Scene {
     }
     return out;
   }
-  std::vector<PointSighting> seen(const Pose<G, B>& T_GB) { return seen(T_GB, T_GB); }
+  std::vector<LandmarkObservation> seen(const Pose<G, B>& T_GB) { return seen(T_GB, T_GB); }
   /// Every other point by a second pair of the same kind, each of its cameras from a pose of its own.
-  std::vector<PointSighting> seen_by_four(const Pose<G, B>& camera_2, const Pose<G, B>& camera_3) {
-    std::vector<PointSighting> out = seen({});
+  std::vector<LandmarkObservation> seen_by_four(const Pose<G, B>& camera_2, const Pose<G, B>& camera_3) {
+    std::vector<LandmarkObservation> out = seen({});
     calibration.more = {rig.T_BC(0), rig.T_BC(1)};
     for (std::size_t i = 0; i < points_.size(); i += 2) {
       features_[i].cameras = {2, 3};

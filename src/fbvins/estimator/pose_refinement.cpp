@@ -38,22 +38,22 @@ struct PoseEquations {
 
 }  // namespace
 
-PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<G, B> guess,
+PoseRefinement refine_pose(const std::vector<LandmarkObservation>& observations, const Calibration& calibration, Pose<G, B> guess,
                            const Vec3& v_B, int max_iterations) {
   const CameraGeometry cameras(calibration);
   PoseRefinement out{guess, 0, false};
   for (int i = 0; i < max_iterations; ++i) {
     PoseEquations n;
     const Mat3 R_BG = out.T_GB.R().transpose();
-    for (const PointSighting& s : sightings) {
-      const Vec3 p_B = R_BG * (s.p_G - out.T_GB.p);
+    for (const LandmarkObservation& l : observations) {
+      const Vec3 p_B = R_BG * (l.p_G - out.T_GB.p);
       const auto add = [&](const Observation& o, int camera) {
         n.add(o, p_B, cameras.R_CB[camera], cameras.t_BC[camera] + o.displacement_B(v_B), R_BG);
       };
-      if (s.feature->left) add(*s.feature->left, s.feature->cameras.left);
+      if (l.feature->left) add(*l.feature->left, l.feature->cameras.left);
       const int of_left = n.inliers;
-      if (s.feature->right) add(*s.feature->right, s.feature->cameras.right);
-      n.inliers = s.feature->left ? of_left : n.inliers;
+      if (l.feature->right) add(*l.feature->right, l.feature->cameras.right);
+      n.inliers = l.feature->left ? of_left : n.inliers;
     }
     out.inliers = n.inliers;
     const Eigen::LDLT<Mat6> ldlt(n.H);

@@ -10,7 +10,7 @@
 
 namespace fbvins {
 
-struct PointSighting {  // a landmark of known position and its observations
+struct LandmarkObservation {  // a landmark of known position and its observations
   Vec3 p_G = Vec3::Zero();
   const TrackedFeature* feature = nullptr;
 };
@@ -22,7 +22,7 @@ struct PoseRefinement {
 };
 
 /// `v_B`: the body's velocity, m/s, which counts where not all was seen at the stamp.
-PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<G, B> guess,
+PoseRefinement refine_pose(const std::vector<LandmarkObservation>& observations, const Calibration& calibration, Pose<G, B> guess,
                            const Vec3& v_B = Vec3::Zero(), int max_iterations = 15);
 
 }  // namespace fbvins

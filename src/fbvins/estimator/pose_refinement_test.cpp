@@ -14,13 +14,13 @@ struct Seen {
   TrackedFrame frame;
   Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
   Pose<G, B> truth;
-  std::vector<PointSighting> sightings;
+  std::vector<LandmarkObservation> observations;
 
   Seen() {
     flight.pixel_sigma_px = 0.3;
     frame = flight.frame(0);
     truth = flight.truth<G>(0).T_FB;
-    for (const TrackedFeature& f : frame.features) sightings.push_back({nearest(f), &f});
+    for (const TrackedFeature& f : frame.features) observations.push_back({nearest(f), &f});
   }
   /// The point whose projection is nearest to the feature.
   Vec3 nearest(const TrackedFeature& f) const {
@@ -39,20 +39,20 @@ struct Seen {
 
 TEST(PoseRefinement, FindsThePoseFromAGuess) {
   Seen s;
-  const PoseRefinement found = refine_pose(s.sightings, s.calibration, s.guess());
+  const PoseRefinement found = refine_pose(s.observations, s.calibration, s.guess());
   EXPECT_TRUE(found.converged);
   EXPECT_LT((found.T_GB.p - s.truth.p).norm(), 0.01);
   EXPECT_LT(so3_log(s.truth.q.conjugate() * found.T_GB.q).norm(), 0.003);
-  EXPECT_GT(found.inliers, 0.9 * static_cast<double>(s.sightings.size()));
+  EXPECT_GT(found.inliers, 0.9 * static_cast<double>(s.observations.size()));
 }
 
 TEST(PoseRefinement, OutliersAreNoInliers) {
   Seen s;
-  const std::size_t wrong = s.sightings.size() / 5;
-  for (std::size_t k = 0; k < wrong; ++k) s.sightings[k].p_G += Vec3(0.5, -0.5, 0.5);
-  const PoseRefinement found = refine_pose(s.sightings, s.calibration, s.guess());
+  const std::size_t wrong = s.observations.size() / 5;
+  for (std::size_t k = 0; k < wrong; ++k) s.observations[k].p_G += Vec3(0.5, -0.5, 0.5);
+  const PoseRefinement found = refine_pose(s.observations, s.calibration, s.guess());
   EXPECT_LT((found.T_GB.p - s.truth.p).norm(), 0.05);
-  EXPECT_LE(found.inliers, static_cast<int>(s.sightings.size() - wrong) + 2);
+  EXPECT_LE(found.inliers, static_cast<int>(s.observations.size() - wrong) + 2);
 }
 
 TEST(PoseRefinement, WithoutFeaturesItDoesNotConverge) {

@@ -40,9 +40,9 @@ std::vector<TrackId> tracks_in_view(const SlidingWindow& window) {
   return out;
 }
 
-std::vector<PointSighting> sightings_of(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
-                                        const Calibration& calibration) {
-  std::vector<PointSighting> out;
+std::vector<LandmarkObservation> landmark_observations(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
+                                                       const Calibration& calibration) {
+  std::vector<LandmarkObservation> out;
   out.reserve(features.size());
   for (const TrackedFeature& feature : features) {
     const Landmark* landmark = window.landmarks().find(feature.id);

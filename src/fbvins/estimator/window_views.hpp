@@ -20,8 +20,8 @@ std::vector<TrackId> tracks_in_view(const SlidingWindow& window);
 
 /// The landmarks of the window whose tracks are among these features, with their estimated positions. The features must outlive
 /// them.
-std::vector<PointSighting> sightings_of(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
-                                        const Calibration& calibration);
+std::vector<LandmarkObservation> landmark_observations(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
+                                                       const Calibration& calibration);
 
 /// Share of the newest frame's features that the last keyframe saw, and the median rotation-free
 /// motion of these in px of a camera with this focal length.

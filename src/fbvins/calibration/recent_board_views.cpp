@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/calibration/board_sightings.hpp"
+#include "fbvins/calibration/recent_board_views.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -24,7 +24,7 @@ std::optional<double> shift_px(const BoardView& from, const BoardView& to) {
 
 }  // namespace
 
-void BoardSightings::add(int camera, Time t, int width_px, const BoardSighting& seen, bool mirrored) {
+void RecentBoardViews::add(int camera, Time t, int width_px, const BoardDetection& seen, bool mirrored) {
   One one{{t, camera, seen.corners}, seen.tags, seen.foreign_tags, seen.twice, mirrored, 0};
   for (auto before = last_.rbegin(); before != last_.rend() && !one.view.corners.empty(); ++before) {
     if (before->view.camera != camera || before->view.corners.empty()) continue;
@@ -37,7 +37,7 @@ void BoardSightings::add(int camera, Time t, int width_px, const BoardSighting& 
   while ((t - last_.front().view.t).seconds() > kMemory_s) last_.pop_front();
 }
 
-std::vector<BoardView> BoardSightings::now() const {
+std::vector<BoardView> RecentBoardViews::now() const {
   std::vector<BoardView> out;
   for (auto one = last_.rbegin(); one != last_.rend(); ++one) {
     if ((last_.back().view.t - one->view.t).seconds() > kNow_s) break;
@@ -48,7 +48,7 @@ std::vector<BoardView> BoardSightings::now() const {
   return out;
 }
 
-std::string BoardSightings::advice() const {
+std::string RecentBoardViews::advice() const {
   if (last_.size() < kFewest) return "";
   const auto part = [&](const auto& fact) {
     return static_cast<double>(std::ranges::count_if(last_, fact)) / static_cast<double>(last_.size());

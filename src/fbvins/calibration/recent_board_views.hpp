@@ -2,8 +2,8 @@
 // What the last images say of how the board is shown, before any calibration does: nowhere in view, too fast to be sharp, another
 // board. One thread.
 //
-//   sightings.add(0, frame.t, width_px, detector.find(image));
-//   if (const std::string advice = sightings.advice(); !advice.empty()) print(advice);
+//   recent.add(0, frame.t, width_px, detector.find(image));
+//   if (const std::string advice = recent.advice(); !advice.empty()) print(advice);
 #pragma once
 
 #include <deque>
@@ -14,10 +14,10 @@
 
 namespace fbvins {
 
-class BoardSightings {
+class RecentBoardViews {
  public:
   /// Of images that were looked at, in order of time or nearly so.
-  void add(int camera, Time t, int width_px, const BoardSighting& seen, bool mirrored = false);
+  void add(int camera, Time t, int width_px, const BoardDetection& seen, bool mirrored = false);
   /// The newest view of each camera, of those that see the board now.
   std::vector<BoardView> now() const;
   /// What to change at once, a sentence without its full stop; empty: the board is well in view.
