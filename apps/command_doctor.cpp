@@ -13,7 +13,7 @@
 #include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/calibration_files.hpp"
-#include "fbvins/doctor/mend.hpp"
+#include "fbvins/doctor/corrected_rig.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/io/png_encode.hpp"
@@ -104,12 +104,12 @@ class PlayedRecording {
   bool played_ = false;
 };
 
-/// Writes the corrected calibration; `mended` loses its rig where the file would not be read back.
-Result<void> write_calibration(Mended& mended, const std::string& file) {
-  const std::string text = to_kalibr_rig(rig_calibration(*mended.rig));
+/// Writes the corrected calibration; `corrected` loses its rig where the file would not be read back.
+Result<void> write_calibration(CorrectedRig& corrected, const std::string& file) {
+  const std::string text = to_kalibr_rig(rig_calibration(*corrected.rig));
   if (Result<StereoRig> read = parse_kalibr_camchain({file, text}); !read) {
-    mended.rig.reset();
-    mended.why_not = read.error().message;
+    corrected.rig.reset();
+    corrected.why_not = read.error().message;
     return {};
   }
   return write_text(file, text);
@@ -120,21 +120,21 @@ bool same_file(const std::string& a, const std::string& b) {
   return !a.empty() && !b.empty() && std::filesystem::equivalent(a, b, ignored);
 }
 
-void print(const Diagnosis& diagnosis, const Mended* mended, const Arguments& arguments) {
+void print(const Diagnosis& diagnosis, const CorrectedRig* corrected, const Arguments& arguments) {
   const std::string why_not =
-      mended == nullptr || mended->rig ? "" : fmt::format("{} is not written: {}", arguments.fix, mended->why_not);
+      corrected == nullptr || corrected->rig ? "" : fmt::format("{} is not written: {}", arguments.fix, corrected->why_not);
   if (arguments.json) {
     Json out = to_json(diagnosis);
-    if (mended != nullptr)
-      out["fix"] = {{"written", mended->rig.has_value()}, {"why_not", why_not}, {"after", to_json(mended->after)}};
+    if (corrected != nullptr)
+      out["fix"] = {{"written", corrected->rig.has_value()}, {"why_not", why_not}, {"after", to_json(corrected->after)}};
     fmt::print("{}\n", out.dump(2));
     return;
   }
   fmt::print("{}\n", to_text(diagnosis, arguments.all));
-  if (mended != nullptr && mended->rig)
+  if (corrected != nullptr && corrected->rig)
     fmt::print("\n{}: the corrected calibration. Examined again with it:\n{}\n", arguments.fix,
-               to_text(mended->after, arguments.all));
-  else if (mended != nullptr) fmt::print("{}\n", why_not);
+               to_text(corrected->after, arguments.all));
+  else if (corrected != nullptr) fmt::print("{}\n", why_not);
 }
 
 int examine_recording(const Arguments& arguments) {
@@ -156,12 +156,12 @@ int examine_recording(const Arguments& arguments) {
     print(*diagnosis, nullptr, arguments);
     return diagnosis->findings.empty() ? kOk : kSensorsWrong;
   }
-  Result<Mended> mended = mend(rig, *diagnosis, replay, style);
-  if (!mended) return fail(mended.error().message);
-  if (mended->rig)
-    if (Result<void> written = write_calibration(*mended, arguments.fix); !written) return fail(written.error().message);
-  print(*diagnosis, &*mended, arguments);
-  return mended->after.findings.empty() && (mended->rig || diagnosis->findings.empty()) ? kOk : kSensorsWrong;
+  Result<CorrectedRig> corrected = correct_rig(rig, *diagnosis, replay, style);
+  if (!corrected) return fail(corrected.error().message);
+  if (corrected->rig)
+    if (Result<void> written = write_calibration(*corrected, arguments.fix); !written) return fail(written.error().message);
+  print(*diagnosis, &*corrected, arguments);
+  return corrected->after.findings.empty() && (corrected->rig || diagnosis->findings.empty()) ? kOk : kSensorsWrong;
 }
 
 }  // namespace

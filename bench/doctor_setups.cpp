@@ -55,37 +55,37 @@ int good(int count, char** paths) {
 
 /// Where only readings are spoilt the images are not looked at again, unless something is very wrong.
 Diagnosis diagnosed(const Recorded& good, const Evidence& clean, const Fault& fault) {
-  const Spoiler spoiler = fault();
-  if (!spoiler.rig && !spoiler.frame) {
+  const SetupFault injected = fault();
+  if (!injected.rig && !injected.frame) {
     Evidence evidence = clean;
-    if (spoiler.lost) std::erase_if(evidence.imu, spoiler.lost);
+    if (injected.lost) std::erase_if(evidence.imu, injected.lost);
     for (ImuSample& sample : evidence.imu)
-      if (spoiler.reading) spoiler.reading(sample);
+      if (injected.reading) injected.reading(sample);
     Diagnosis as_given = examine(evidence);
     if (!is_strange(as_given)) return as_given;
   }
   StereoRig rig = good.rig;
-  if (spoiler.rig) spoiler.rig(rig);
+  if (injected.rig) injected.rig(rig);
   const Replay replay = [&](const TakeEvent& take) { return play(good, fault, rig.time_offset_s, take); };
   return *diagnose(rig, replay, CalibrationStyle::kalibr);
 }
 
 /// Whether it is named with the right size.
 bool judge(const Recorded& good, const Evidence& clean, const Fault& fault, const Rows& rows) {
-  const Spoiler spoiler = fault();
+  const SetupFault injected = fault();
   const Diagnosis diagnosis = diagnosed(good, clean, fault);
   const Finding* named = nullptr;
   for (const Finding& finding : diagnosis.findings)
-    if (finding.kind == spoiler.kind) named = &finding;
-  const bool sized = named != nullptr && (spoiler.size == 0 || std::abs(named->size - spoiler.size) <= spoiler.tolerance);
+    if (finding.kind == injected.kind) named = &finding;
+  const bool sized = named != nullptr && (injected.size == 0 || std::abs(named->size - injected.size) <= injected.tolerance);
   const bool only =
-      named != nullptr && std::ranges::all_of(diagnosis.findings, [&](const Finding& f) { return f.kind == spoiler.kind; });
+      named != nullptr && std::ranges::all_of(diagnosis.findings, [&](const Finding& f) { return f.kind == injected.kind; });
   std::string row = fmt::format(
-      "| {} | {} | {} | {} | {} | {} |\n", spoiler.name, kinds(diagnosis.findings),
+      "| {} | {} | {} | {} | {} | {} |\n", injected.name, kinds(diagnosis.findings),
       named == nullptr ? "MISSED"
       : only           ? "named"
                        : "named, others too",
-      spoiler.size == 0 ? "" : fmt::format("{:.4g} +- {:.4g}", spoiler.size, spoiler.tolerance),
+      injected.size == 0 ? "" : fmt::format("{:.4g} +- {:.4g}", injected.size, injected.tolerance),
       named == nullptr ? "" : fmt::format("{:.4g} +- {:.2g} {}", named->size, named->sigma, named->unit), sized ? "ok" : "WRONG");
   if (!sized || !only) row += all_of(diagnosis);
   rows.add(row);
@@ -97,12 +97,12 @@ int wrong(const std::string& path, const std::string& word, const Rows& rows) {
   if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
   const auto clean = gather(path);
   if (!clean) return fmt::print(stderr, "{}\n", clean.error().message), 2;
-  const std::vector<Spoiler> all = spoilers(good->rig);
+  const std::vector<SetupFault> all = setup_faults(good->rig);
   bool failed = false;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (all[i].name.find(word) != std::string::npos && !rows.has(all[i].name))
       failed |= !judge(
-          *good, *clean, [&good, i] { return spoilers(good->rig)[i]; }, rows);
+          *good, *clean, [&good, i] { return setup_faults(good->rig)[i]; }, rows);
   return failed;
 }
 

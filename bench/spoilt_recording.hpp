@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "fbvins/doctor/diagnose.hpp"
-#include "fbvins/doctor/spoilers.hpp"
+#include "fbvins/doctor/setup_faults.hpp"
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins::bench {
@@ -42,11 +42,11 @@ inline Result<Recorded> record(const std::string& path) {
 }
 
 /// A fault with its own state; none spoils nothing.
-using Fault = std::function<Spoiler()>;
+using Fault = std::function<SetupFault()>;
 
 /// The events of a spoilt recording in the order in which a rig with this time offset gets them.
 inline Result<void> play(const Recorded& good, const Fault& fault, double offset_s, const TakeEvent& take) {
-  const Spoiler spoil = fault();
+  const SetupFault spoil = fault();
   std::vector<ImuSample> readings = good.readings;
   if (spoil.lost) std::erase_if(readings, spoil.lost);
   if (spoil.reading && !spoil.frame)

@@ -237,7 +237,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn("swapped_images: ", said)
 
     def test_doctor_fix(self):
-        """A calibration that is wrong is mended, with which the doctor finds nothing; where no calibration helps, nothing is written."""
+        """A wrong calibration is corrected, with which the doctor finds nothing; where no calibration helps, nothing is written."""
         flight, fixed = self.folder / "flight", self.folder / "fixed.yaml"
         self.assertEqual(fbvins("simulate", "handheld", "--out", flight, "--seconds", 6, "--quiet").returncode, 0)
         done = fbvins("doctor", flight, "--fix", fixed)
@@ -265,7 +265,7 @@ class CommandLine(unittest.TestCase):
         rewrite(lambda row: row[:4] + [str(float(a) / 9.80665) for a in row[4:]])
         done = fbvins("doctor", flight, "--fix", fixed, "--json")
         self.assertEqual(done.returncode, 1, done)
-        self.assertEqual(json.loads(done.stdout)["fix"]["why_not"], f"{fixed} is not written: nothing of what is wrong can be mended in a calibration")
+        self.assertEqual(json.loads(done.stdout)["fix"]["why_not"], f"{fixed} is not written: nothing of what is wrong can be corrected in a calibration")
         self.assertFalse(fixed.exists())
 
     def test_mocap(self):

@@ -19,7 +19,7 @@ struct CommonMistake {
   std::string advice;  ///< as in Finding
   StereoRig rig;       ///< the calibration without it
   ImageFlip flip = ImageFlip::none;
-  std::vector<CalibrationField> fields = {};  ///< empty: no calibration mends it
+  std::vector<CalibrationField> fields = {};  ///< empty: no calibration corrects it
   /// Rotation in images with that flip, in the axes of `rig`'s C0: that of a mirror image goes about other axes.
   Mat3 seen_as = Mat3::Identity();
 };

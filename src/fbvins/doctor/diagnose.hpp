@@ -26,7 +26,7 @@ using Replay = std::function<Result<void>(const TakeEvent&)>;
 Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style);
 
 /// Of lenses that were scaled to the images (DatasetOptions::scale_lenses), with which `found` was found: one more finding, which
-/// they mend. With none of them nothing changes.
+/// they correct. With none of them nothing changes.
 void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found);
 
 /// The calibration as given, not compared with common mistakes.

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/doctor/spoilers.hpp"
+#include "fbvins/doctor/setup_faults.hpp"
 #include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {
@@ -33,32 +33,32 @@ const Finding* find(const Diagnosis& diagnosis, FindingKind kind) {
 }
 
 /// Evidence of a recording with an injected fault: the gatherer's working rig is right but for the baseline's length.
-Evidence spoilt(const Spoiler& spoiler) {
+Evidence spoilt(const SetupFault& fault) {
   Evidence evidence = good();
-  if (spoiler.rig) spoiler.rig(evidence.rig);
+  if (fault.rig) fault.rig(evidence.rig);
   const double longer = evidence.rig.T_C1C0().p.norm() / evidence.working_rig.T_C1C0().p.norm();
   Vec3& p_BC1 = evidence.working_rig.T_BC1.p;
   p_BC1 = evidence.working_rig.T_BC0.p + longer * (p_BC1 - evidence.working_rig.T_BC0.p);
   for (SeenFrame& frame : evidence.frames)
     for (SeenFeature& feature : frame.features) feature.inverse_depth /= longer;
-  if (spoiler.reading)
-    for (ImuSample& sample : evidence.imu) spoiler.reading(sample);
+  if (fault.reading)
+    for (ImuSample& sample : evidence.imu) fault.reading(sample);
   return evidence;
 }
 
 void expect_named(const std::string& name) {
-  for (const Spoiler& spoiler : spoilers(good().rig)) {
-    if (spoiler.name != name) continue;
-    const Diagnosis diagnosis = examine(spoilt(spoiler));
-    const Finding* finding = find(diagnosis, spoiler.kind);
+  for (const SetupFault& fault : setup_faults(good().rig)) {
+    if (fault.name != name) continue;
+    const Diagnosis diagnosis = examine(spoilt(fault));
+    const Finding* finding = find(diagnosis, fault.kind);
     ASSERT_NE(finding, nullptr) << name << "\n" << all_of(diagnosis);
     EXPECT_EQ(diagnosis.findings.size(), 1u) << name << "\n" << all_of(diagnosis);
-    if (spoiler.size != 0) {
-      EXPECT_NEAR(finding->size, spoiler.size, spoiler.tolerance) << all_of(diagnosis);
+    if (fault.size != 0) {
+      EXPECT_NEAR(finding->size, fault.size, fault.tolerance) << all_of(diagnosis);
     }
     return;
   }
-  FAIL() << "there is no spoiler '" << name << "'";
+  FAIL() << "there is no fault '" << name << "'";
 }
 
 TEST(Diagnosis, TheLastLineSaysWhatWasJudged) {

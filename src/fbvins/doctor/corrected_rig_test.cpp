@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Common mistakes as calibrations, and the judgement of a corrected one; rendered flights: tests/doctor.
-#include "fbvins/doctor/mend.hpp"
+#include "fbvins/doctor/corrected_rig.hpp"
 
 #include <gtest/gtest.h>
 
 #include "fbvins/doctor/common_mistakes.hpp"
-#include "fbvins/doctor/spoilers.hpp"
+#include "fbvins/doctor/setup_faults.hpp"
 #include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {
-namespace mend_test {
+namespace corrected_rig_test {
 
 Finding of(FindingKind kind, double size = 1) {
   Finding finding;
@@ -32,8 +32,8 @@ TEST(CommonMistakes, AreUndoneByTheirCalibration) {
                                     {"lenses of a calibration at half the size", "twice the calibration's size"},
                                     {"lenses exchanged", "lenses exchanged"}}) {
     StereoRig wrong = right;
-    for (const Spoiler& spoiler : spoilers(right))
-      if (spoiler.name == fault) spoiler.rig(wrong);
+    for (const SetupFault& injected : setup_faults(right))
+      if (injected.name == fault) injected.rig(wrong);
     const StereoRig undone = mistake_with(common_mistakes(wrong), what).rig;
     EXPECT_LT((undone.T_BC0.p - right.T_BC0.p).norm() + (undone.T_BC1.p - right.T_BC1.p).norm(), 1e-12) << fault;
     EXPECT_LT((undone.T_BC0.R() - right.T_BC0.R()).norm() + (undone.T_BC1.R() - right.T_BC1.R()).norm(), 1e-12) << fault;
@@ -59,7 +59,7 @@ TEST(CommonMistakes, AreThoughtOfWhereSomethingIsVeryWrong) {
   EXPECT_TRUE(is_strange(diagnosis));
 }
 
-TEST(Mend, IsBetterWithFewerUnknownFigures) {
+TEST(CorrectedRig, IsBetterWithFewerUnknownFigures) {
   Diagnosis before, after;
   before.epipolar_px = 4, after.epipolar_px = 0.4;
   before.findings = {of(FindingKind::right_camera_turned), of(FindingKind::imu_stamps)};
@@ -73,7 +73,7 @@ TEST(Mend, IsBetterWithFewerUnknownFigures) {
             "imu_stamps, imu_camera_rotation)");
 }
 
-TEST(Mend, IsNotBetterWhereTheImagesFitWorse) {
+TEST(CorrectedRig, IsNotBetterWhereTheImagesFitWorse) {
   Diagnosis before, after;
   before.findings = {of(FindingKind::baseline_length)};
   before.epipolar_px = 0.4, after.epipolar_px = 0.7;
@@ -98,5 +98,5 @@ TEST(CalibrationLines, EachFieldHasOneLineAtItsFirstFinding) {
   EXPECT_EQ(findings[2].corrected, "");
 }
 
-}  // namespace mend_test
+}  // namespace corrected_rig_test
 }  // namespace fbvins

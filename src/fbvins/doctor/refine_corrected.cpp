@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/doctor/refine_mended.hpp"
+#include "fbvins/doctor/refine_corrected.hpp"
 
 #include <vector>
 

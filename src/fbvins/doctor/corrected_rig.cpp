@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/doctor/mend.hpp"
+#include "fbvins/doctor/corrected_rig.hpp"
 
 #include <fmt/format.h>
 
@@ -8,12 +8,12 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/doctor/common_mistakes.hpp"
-#include "fbvins/doctor/refine_mended.hpp"
+#include "fbvins/doctor/refine_corrected.hpp"
 
 namespace fbvins {
 namespace {
 
-/// What is hidden by a large error shows when that is mended, and is mended in the next round.
+/// What is hidden by a large error shows when that is corrected, and is corrected in the next round.
 constexpr int kRounds = 3;
 /// Errors may be larger by this, which repeated examinations of the same recording differ by.
 constexpr double kSameShare = 1.1, kSame_px = 0.1;
@@ -49,17 +49,18 @@ Result<void> fits_no_worse(const std::optional<double>& before, const std::optio
 }
 
 /// Takes what a flight refines of a corrected calibration, where the recording examined again with it is explained as well.
-Result<void> refine(std::span<const Finding> corrected_for, const Replay& replay, CalibrationStyle style, Mended& mended) {
-  const Result<std::optional<StereoRig>> refined = refined_by_flight(*mended.rig, corrected_for, replay);
+Result<void> refine(std::span<const Finding> corrected_for, const Replay& replay, CalibrationStyle style,
+                    CorrectedRig& corrected) {
+  const Result<std::optional<StereoRig>> refined = refined_by_flight(*corrected.rig, corrected_for, replay);
   if (!refined) return refined.error();
   if (!*refined || !check_rig(**refined, "the refined calibration")) return {};
   Result<Diagnosis> after = examine_with(**refined, replay, style);
   if (!after) return after.error();
-  if (cost_of(*after) > cost_of(mended.after)) return {};
+  if (cost_of(*after) > cost_of(corrected.after)) return {};
   for (const auto& [before_px, after_px] :
-       {std::pair{mended.after.epipolar_px, after->epipolar_px}, std::pair{mended.after.predicted_px, after->predicted_px}})
+       {std::pair{corrected.after.epipolar_px, after->epipolar_px}, std::pair{corrected.after.predicted_px, after->predicted_px}})
     if (!fits_no_worse(before_px, after_px, "")) return {};
-  mended.rig = **refined, mended.after = *std::move(after);
+  corrected.rig = **refined, corrected.after = *std::move(after);
   return {};
 }
 
@@ -73,42 +74,43 @@ Result<void> is_better(const Diagnosis& before, const Diagnosis& after) {
   return fits_no_worse(before.predicted_px, after.predicted_px, "error of a predicted feature");
 }
 
-Result<Mended> mend(const StereoRig& rig, const Diagnosis& before, const Replay& replay, CalibrationStyle style) {
-  Mended mended;
-  mended.after = before;
+Result<CorrectedRig> correct_rig(const StereoRig& rig, const Diagnosis& before, const Replay& replay, CalibrationStyle style) {
+  CorrectedRig corrected;
+  corrected.after = before;
   if (std::any_of(before.findings.begin(), before.findings.end(),
                   [](const Finding& f) { return f.kind == FindingKind::images_mirrored; })) {
-    mended.why_not = "no calibration describes mirrored images";
-    return mended;
+    corrected.why_not = "no calibration describes mirrored images";
+    return corrected;
   }
   if (!concerns_calibration(before)) {
-    mended.why_not = before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be mended in a calibration";
-    return mended;
+    corrected.why_not =
+        before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be corrected in a calibration";
+    return corrected;
   }
   if (rig.camera_count() > 2) {
-    mended.why_not = "the doctor judges a pair, and there are more cameras: --camera both takes the first two";
-    return mended;
+    corrected.why_not = "the doctor judges a pair, and there are more cameras: --camera both takes the first two";
+    return corrected;
   }
   std::vector<Finding> corrected_for;
-  for (int round = 0; round < kRounds && concerns_calibration(mended.after); ++round) {
-    const StereoRig corrected = as_named(mended.after);
-    Result<void> judged = check_rig(corrected, "the corrected calibration");
+  for (int round = 0; round < kRounds && concerns_calibration(corrected.after); ++round) {
+    const StereoRig candidate = as_named(corrected.after);
+    Result<void> judged = check_rig(candidate, "the corrected calibration");
     if (judged) {
-      Result<Diagnosis> after = examine_with(corrected, replay, style);
+      Result<Diagnosis> after = examine_with(candidate, replay, style);
       if (!after) return after.error();
-      judged = is_better(mended.after, *after);
+      judged = is_better(corrected.after, *after);
       if (judged) {
-        corrected_for.insert(corrected_for.end(), mended.after.findings.begin(), mended.after.findings.end());
-        mended.rig = corrected, mended.after = *std::move(after);
+        corrected_for.insert(corrected_for.end(), corrected.after.findings.begin(), corrected.after.findings.end());
+        corrected.rig = candidate, corrected.after = *std::move(after);
       }
     }
     if (judged) continue;
-    if (!mended.rig) mended.why_not = judged.error().message;
+    if (!corrected.rig) corrected.why_not = judged.error().message;
     break;
   }
-  if (mended.rig)
-    if (Result<void> done = refine(corrected_for, replay, style, mended); !done) return done.error();
-  return mended;
+  if (corrected.rig)
+    if (Result<void> done = refine(corrected_for, replay, style, corrected); !done) return done.error();
+  return corrected;
 }
 
 }  // namespace fbvins

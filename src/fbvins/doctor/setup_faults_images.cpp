@@ -6,13 +6,13 @@
 #include <memory>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/doctor/spoiler_lists.hpp"
+#include "fbvins/doctor/setup_fault_lists.hpp"
 
-namespace fbvins::spoil {
+namespace fbvins::setup_fault {
 namespace {
 
 /// Each `nth` image is the one before.
-Spoiler frozen(std::string name, int nth, bool left, bool right) {
+SetupFault frozen(std::string name, int nth, bool left, bool right) {
   struct State {
     StereoFrame before;
     int count = 0;
@@ -27,7 +27,7 @@ Spoiler frozen(std::string name, int nth, bool left, bool right) {
           }};
 }
 
-Spoiler right_one_frame_late(double period_s) {
+SetupFault right_one_frame_late(double period_s) {
   auto before = std::make_shared<std::shared_ptr<const Image>>();
   return {"right images one frame old",
           FindingKind::stereo_sync,
@@ -59,7 +59,7 @@ void add_dot(Image& image, double x, double y, double brightness) {
 }
 
 /// A projector beside the cameras: a pattern that moves with them.
-Spoiler dots(const StereoRig& rig) {
+SetupFault dots(const StereoRig& rig) {
   std::vector<Vec2> places;
   Rng rng(5);
   for (int y = 8; y < rig.left.height() - 8; y += 18)
@@ -78,7 +78,7 @@ Spoiler dots(const StereoRig& rig) {
 }
 
 /// A part of the vehicle in the lower third of both images.
-Spoiler vehicle_in_view() {
+SetupFault vehicle_in_view() {
   return {"vehicle in view", FindingKind::fixed_in_view, 0, 0, {}, {}, [](StereoFrame& frame) {
             const auto paint = [](Image& image) {
               Rng rng(9);
@@ -130,7 +130,7 @@ void smear(Image& image, const std::vector<Eigen::Matrix<double, 2, 3>>& flow, c
 }
 
 /// Blur by the rate of the newest reading before an image.
-Spoiler exposed_longer(const StereoRig& rig, double ms) {
+SetupFault exposed_longer(const StereoRig& rig, double ms) {
   auto rate_B = std::make_shared<Vec3>(Vec3::Zero());
   return {fmt::format("exposed for {:.0f} ms longer", ms),
           FindingKind::blur,
@@ -145,7 +145,7 @@ Spoiler exposed_longer(const StereoRig& rig, double ms) {
           }};
 }
 
-Spoiler turned_images() {
+SetupFault turned_images() {
   const auto half_turn = [](Image& image) {
     for (int y = 0; y < image.height() / 2; ++y)
       std::swap_ranges(image.row(y), image.row(y) + image.width(), image.row(image.height() - 1 - y));
@@ -157,7 +157,7 @@ Spoiler turned_images() {
           }};
 }
 
-Spoiler mirrored_images() {
+SetupFault mirrored_images() {
   const auto mirror = [](Image& image) {
     for (int y = 0; y < image.height(); ++y) std::reverse(image.row(y), image.row(y) + image.width());
   };
@@ -169,8 +169,8 @@ Spoiler mirrored_images() {
 
 }  // namespace
 
-std::vector<Spoiler> of_the_images(const StereoRig& rig) {
-  std::vector<Spoiler> all;
+std::vector<SetupFault> of_the_images(const StereoRig& rig) {
+  std::vector<SetupFault> all;
   all.push_back({"left and right exchanged", FindingKind::swapped_images, 0, 0, {}, {}, [](StereoFrame& f) {
                    std::swap(f.left, f.right);
                  }});
@@ -190,4 +190,4 @@ std::vector<Spoiler> of_the_images(const StereoRig& rig) {
   return all;
 }
 
-}  // namespace fbvins::spoil
+}  // namespace fbvins::setup_fault

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "fbvins/core/angle.hpp"
-#include "fbvins/doctor/spoiler_lists.hpp"
+#include "fbvins/doctor/setup_fault_lists.hpp"
 
-namespace fbvins::spoil {
+namespace fbvins::setup_fault {
 namespace {
 
 Mat3 axes(int x, int y, int z) {
@@ -19,13 +19,13 @@ Mat3 axes(int x, int y, int z) {
   return P;
 }
 
-Spoiler gyro(std::string name, FindingKind kind, double size, double tolerance, const Mat3& by) {
+SetupFault gyro(std::string name, FindingKind kind, double size, double tolerance, const Mat3& by) {
   return {std::move(name), kind, size, tolerance, {}, [by](ImuSample& s) { s.gyro_radps = by * s.gyro_radps; }, {}};
 }
-Spoiler accel(std::string name, FindingKind kind, double size, double tolerance, const Mat3& by) {
+SetupFault accel(std::string name, FindingKind kind, double size, double tolerance, const Mat3& by) {
   return {std::move(name), kind, size, tolerance, {}, [by](ImuSample& s) { s.accel_mps2 = by * s.accel_mps2; }, {}};
 }
-Spoiler imu_turned(std::string name, const Mat3& by) {
+SetupFault imu_turned(std::string name, const Mat3& by) {
   const double angle = kDegreesPerRad * so3_log(Quat(by)).norm();
   return {std::move(name),
           FindingKind::imu_camera_rotation,
@@ -35,7 +35,7 @@ Spoiler imu_turned(std::string name, const Mat3& by) {
           [by](ImuSample& s) { s.gyro_radps = by * s.gyro_radps, s.accel_mps2 = by * s.accel_mps2; },
           {}};
 }
-Spoiler readings_late(double ms) {
+SetupFault readings_late(double ms) {
   return {fmt::format("readings stamped {:+.0f} ms", ms),
           FindingKind::time_offset,
           ms,
@@ -45,7 +45,7 @@ Spoiler readings_late(double ms) {
           {}};
 }
 /// The accelerometer's readings come `late` readings after the gyroscope's.
-Spoiler accel_late(std::size_t late, double ms) {
+SetupFault accel_late(std::size_t late, double ms) {
   auto before = std::make_shared<std::deque<Vec3>>();
   return {fmt::format("accelerometer {:.0f} ms late", ms),
           FindingKind::accel_late,
@@ -59,12 +59,12 @@ Spoiler accel_late(std::size_t late, double ms) {
           },
           {}};
 }
-Spoiler offset_by(std::string name, FindingKind kind, double size, double tolerance, const Vec3& gyro, const Vec3& accel) {
+SetupFault offset_by(std::string name, FindingKind kind, double size, double tolerance, const Vec3& gyro, const Vec3& accel) {
   return {std::move(name), kind, size, tolerance, {}, [=](ImuSample& s) { s.gyro_radps += gyro, s.accel_mps2 += accel; }, {}};
 }
 
 /// Readings saturate at +-`range`, rad/s.
-Spoiler clipped_gyro(double range) {
+SetupFault clipped_gyro(double range) {
   return {fmt::format("gyroscope of {:.1f} rad/s", range),
           FindingKind::saturation,
           0,
@@ -74,7 +74,7 @@ Spoiler clipped_gyro(double range) {
           {}};
 }
 
-Spoiler vibration() {
+SetupFault vibration() {
   return {"vibration of 12 m/s^2 at 83 Hz",
           FindingKind::vibration,
           0,
@@ -87,7 +87,7 @@ Spoiler vibration() {
           {}};
 }
 
-Spoiler each_given_twice() {
+SetupFault each_given_twice() {
   auto held = std::make_shared<std::pair<int, ImuSample>>();
   return {"each reading given twice",
           FindingKind::imu_stamps,
@@ -101,7 +101,7 @@ Spoiler each_given_twice() {
           {}};
 }
 
-Spoiler stamped_since_power_on() {
+SetupFault stamped_since_power_on() {
   return {"readings stamped since power-on",
           FindingKind::clocks_apart,
           0,
@@ -113,7 +113,7 @@ Spoiler stamped_since_power_on() {
 
 }  // namespace
 
-std::vector<Spoiler> of_the_imu() {
+std::vector<SetupFault> of_the_imu() {
   const Mat3 one = Mat3::Identity();
   return {
       gyro("gyroscope in degrees", FindingKind::gyro_units, kDegreesPerRad, kTenth * kDegreesPerRad, kDegreesPerRad * one),
@@ -152,4 +152,4 @@ std::vector<Spoiler> of_the_imu() {
   };
 }
 
-}  // namespace fbvins::spoil
+}  // namespace fbvins::setup_fault

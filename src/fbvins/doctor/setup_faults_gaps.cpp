@@ -6,9 +6,9 @@
 #include <memory>
 #include <optional>
 
-#include "fbvins/doctor/spoiler_lists.hpp"
+#include "fbvins/doctor/setup_fault_lists.hpp"
 
-namespace fbvins::spoil {
+namespace fbvins::setup_fault {
 namespace {
 
 /// Time since the first reading, s.
@@ -21,7 +21,7 @@ struct SinceFirst {
 };
 
 /// Readings are lost for the first `gap_s` of every `every_s`, but for the first of these.
-Spoiler gaps(std::string name, double gap_s, double every_s) {
+SetupFault gaps(std::string name, double gap_s, double every_s) {
   return {std::move(name), FindingKind::imu_gaps, 0, 0, {}, {}, {}, [=, since = SinceFirst()](const ImuSample& s) {
             const double t = since(s.t);
             return t > every_s && std::fmod(t, every_s) < gap_s;
@@ -29,7 +29,7 @@ Spoiler gaps(std::string name, double gap_s, double every_s) {
 }
 
 /// The same, filled with the last reading or with zeros.
-Spoiler filled(std::string name, double gap_s, double every_s, bool zeros) {
+SetupFault filled(std::string name, double gap_s, double every_s, bool zeros) {
   auto last = std::make_shared<ImuSample>();
   return {std::move(name), FindingKind::imu_gaps, 0, 0, {}, [=, since = SinceFirst()](ImuSample& s) {
             const double t = since(s.t);
@@ -41,7 +41,7 @@ Spoiler filled(std::string name, double gap_s, double every_s, bool zeros) {
 }
 
 /// Readings lost once, after which stamps are counted on.
-Spoiler closed_up(double at_s, double gap_s) {
+SetupFault closed_up(double at_s, double gap_s) {
   const SinceFirst since;
   return {fmt::format("{:.0f} ms of readings lost, and stamps counted on", 1e3 * gap_s),
           FindingKind::clocks_drift,
@@ -55,7 +55,7 @@ Spoiler closed_up(double at_s, double gap_s) {
           [=](const ImuSample& s) { return since(s.t) >= at_s && since(s.t) < at_s + gap_s; }};
 }
 
-Spoiler in_blocks(int size) {
+SetupFault in_blocks(int size) {
   auto state = std::make_shared<std::pair<int, Time>>();
   return {fmt::format("readings stamped in blocks of {}", size), FindingKind::imu_stamps, 0, 0, {}, [=](ImuSample& s) {
             if (state->first % size == 0) state->second = s.t;
@@ -65,7 +65,7 @@ Spoiler in_blocks(int size) {
 
 }  // namespace
 
-std::vector<Spoiler> of_gaps() {
+std::vector<SetupFault> of_gaps() {
   auto count = std::make_shared<int>(0);
   return {
       {"one reading in ten lost",
@@ -93,4 +93,4 @@ std::vector<Spoiler> of_gaps() {
   };
 }
 
-}  // namespace fbvins::spoil
+}  // namespace fbvins::setup_fault

@@ -4,22 +4,22 @@
 
 #include <algorithm>
 
-#include "fbvins/doctor/mend.hpp"
-#include "fbvins/doctor/spoilers.hpp"
+#include "fbvins/doctor/corrected_rig.hpp"
+#include "fbvins/doctor/setup_faults.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "tests/rendered_recording.hpp"
 
 namespace fbvins {
-namespace mend_test {
+namespace corrected_rig_test {
 
 struct Flight : test::RenderedRecording {
-  Replay replay(const Spoiler& spoiler = {}) const {
-    return [this, spoiler](const TakeEvent& take) -> Result<void> {
+  Replay replay(const SetupFault& fault = {}) const {
+    return [this, fault](const TakeEvent& take) -> Result<void> {
       for (SensorEvent event : events) {
-        if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && spoiler.frame) spoiler.frame(*frame);
+        if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && fault.frame) fault.frame(*frame);
         if (auto* sample = std::get_if<ImuSample>(&event); sample != nullptr) {
-          if (spoiler.lost && spoiler.lost(*sample)) continue;
-          if (spoiler.reading) spoiler.reading(*sample);
+          if (fault.lost && fault.lost(*sample)) continue;
+          if (fault.reading) fault.reading(*sample);
         }
         if (!take(std::move(event))) break;
       }
@@ -39,16 +39,16 @@ const Flight& handheld() {
   return flight;
 }
 
-Spoiler spoiler_named(const std::string& name) {
-  for (Spoiler& spoiler : spoilers(handheld().rig))
-    if (spoiler.name == name) return std::move(spoiler);
-  ADD_FAILURE() << "there is no spoiler '" << name << "'";
+SetupFault fault_named(const std::string& name) {
+  for (SetupFault& fault : setup_faults(handheld().rig))
+    if (fault.name == name) return std::move(fault);
+  ADD_FAILURE() << "there is no fault '" << name << "'";
   return {};
 }
 
-StereoRig spoilt_rig(const Spoiler& spoiler) {
+StereoRig spoilt_rig(const SetupFault& fault) {
   StereoRig rig = handheld().rig;
-  if (spoiler.rig) spoiler.rig(rig);
+  if (fault.rig) fault.rig(rig);
   return rig;
 }
 
@@ -63,52 +63,52 @@ void expect_right(const StereoRig& rig) {
   EXPECT_NEAR(rig.time_offset_s, right.time_offset_s, 1e-3);
 }
 
-/// The first finding, whose kind is the spoiler's, and the mended rig.
-Mended mended(const std::string& name) {
-  const Spoiler spoiler = spoiler_named(name);
-  const StereoRig rig = spoilt_rig(spoiler);
-  const Result<Diagnosis> diagnosis = diagnose(rig, handheld().replay(spoiler), CalibrationStyle::kalibr);
+/// The first finding, whose kind is the fault's, and the corrected rig.
+CorrectedRig corrected(const std::string& name) {
+  const SetupFault fault = fault_named(name);
+  const StereoRig rig = spoilt_rig(fault);
+  const Result<Diagnosis> diagnosis = diagnose(rig, handheld().replay(fault), CalibrationStyle::kalibr);
   EXPECT_TRUE(diagnosis.ok());
   EXPECT_FALSE(diagnosis->findings.empty()) << name;
   if (!diagnosis->findings.empty()) {
-    EXPECT_EQ(diagnosis->findings.front().kind, spoiler.kind) << to_text(*diagnosis, true);
+    EXPECT_EQ(diagnosis->findings.front().kind, fault.kind) << to_text(*diagnosis, true);
   }
-  Result<Mended> out = mend(rig, *diagnosis, handheld().replay(spoiler), CalibrationStyle::kalibr);
+  Result<CorrectedRig> out = correct_rig(rig, *diagnosis, handheld().replay(fault), CalibrationStyle::kalibr);
   EXPECT_TRUE(out.ok());
   return *std::move(out);
 }
 
-TEST(DoctorMends, TransformsInTheOtherDirection) {
+TEST(DoctorCorrects, TransformsInTheOtherDirection) {
   for (const char* name : {"both transforms to the IMU inverted", "transform from camera to camera inverted"}) {
-    const Mended found = mended(name);
+    const CorrectedRig found = corrected(name);
     ASSERT_TRUE(found.rig) << name << ": " << found.why_not;
     expect_right(*found.rig);
     EXPECT_TRUE(found.after.findings.empty()) << name << "\n" << to_text(found.after);
   }
 }
 
-TEST(DoctorMends, ImagesUpsideDownByTheCalibrationOfSuchImages) {
-  const Mended found = mended("images upside down");
+TEST(DoctorCorrects, ImagesUpsideDownByTheCalibrationOfSuchImages) {
+  const CorrectedRig found = corrected("images upside down");
   ASSERT_TRUE(found.rig) << found.why_not;
   EXPECT_NEAR(degrees_between(found.rig->T_BC0.R(), handheld().rig.T_BC0.R()), 180, 0.5);
   EXPECT_TRUE(found.after.findings.empty()) << to_text(found.after);
 }
 
-TEST(DoctorMends, WhatIsJudgedAndSaysWhatIsNot) {
-  const Mended found = mended("mounting wrong by 4 degrees and baseline 12 % too long");
+TEST(DoctorCorrects, WhatIsJudgedAndSaysWhatIsNot) {
+  const CorrectedRig found = corrected("mounting wrong by 4 degrees and baseline 12 % too long");
   ASSERT_TRUE(found.rig) << found.why_not;
   EXPECT_LT(degrees_between(found.rig->T_BC0.R(), handheld().rig.T_BC0.R()), 0.5);
   // The rig hardly accelerates, which the length of the baseline would be seen by.
   EXPECT_NE(to_text(found.after).find("length of the baseline: the rig hardly accelerated"), std::string::npos);
 }
 
-TEST(DoctorMends, MoreAccuratelyThanItMeasures) {
-  const Mended found = mended("right camera turned 1.5 degrees about z");
+TEST(DoctorCorrects, MoreAccuratelyThanItMeasures) {
+  const CorrectedRig found = corrected("right camera turned 1.5 degrees about z");
   ASSERT_TRUE(found.rig) << found.why_not;
   EXPECT_LT(degrees_between(found.rig->T_C1C0().R(), handheld().rig.T_C1C0().R()), 0.01);
 }
 
-TEST(DoctorMends, TheLensesOfAnotherImageSize) {
+TEST(DoctorCorrects, TheLensesOfAnotherImageSize) {
   const StereoRig& images = handheld().rig;
   const ImageSize size{images.left.width(), images.left.height()}, twice{2 * size.width, 2 * size.height};
   const std::vector<ScaledLens> scaled{{0, twice, size}, {1, twice, size}};
@@ -119,22 +119,23 @@ TEST(DoctorMends, TheLensesOfAnotherImageSize) {
   EXPECT_NEAR(diagnosis.findings[0].size, 0.5, 1e-12);
   EXPECT_NE(diagnosis.findings[0].corrected.find("cam0: resolution: [752, 480]\n"), std::string::npos)
       << diagnosis.findings[0].corrected;
-  const Result<Mended> found = mend(images, diagnosis, handheld().replay(), CalibrationStyle::kalibr);
+  const Result<CorrectedRig> found = correct_rig(images, diagnosis, handheld().replay(), CalibrationStyle::kalibr);
   ASSERT_TRUE(found && found->rig) << found->why_not;
   EXPECT_TRUE(found->after.findings.empty()) << to_text(found->after);
   EXPECT_EQ(found->rig->left.intrinsics(), images.left.intrinsics());
 }
 
-TEST(DoctorMends, NothingWhereNoCalibrationHelps) {
-  EXPECT_EQ(mended("images mirrored").why_not, "no calibration describes mirrored images");
-  EXPECT_FALSE(mended("gyroscope in degrees").rig);
-  const Result<Mended> good = mend(handheld().rig, *diagnose(handheld().rig, handheld().replay(), CalibrationStyle::kalibr),
-                                   handheld().replay(), CalibrationStyle::kalibr);
+TEST(DoctorCorrects, NothingWhereNoCalibrationHelps) {
+  EXPECT_EQ(corrected("images mirrored").why_not, "no calibration describes mirrored images");
+  EXPECT_FALSE(corrected("gyroscope in degrees").rig);
+  const Result<CorrectedRig> good =
+      correct_rig(handheld().rig, *diagnose(handheld().rig, handheld().replay(), CalibrationStyle::kalibr), handheld().replay(),
+                  CalibrationStyle::kalibr);
   ASSERT_TRUE(good.ok());
   EXPECT_EQ(good->why_not, "nothing is wrong");
 }
 
-TEST(DoctorMends, NothingThatIsJudgedNoBetter) {
+TEST(DoctorCorrects, NothingThatIsJudgedNoBetter) {
   // The lines of another rig, as a wrong diagnosis would have them.
   const Replay replay = handheld().replay();
   Diagnosis wrong = *diagnose(handheld().rig, replay, CalibrationStyle::kalibr);
@@ -143,11 +144,11 @@ TEST(DoctorMends, NothingThatIsJudgedNoBetter) {
   finding.kind = FindingKind::baseline_length;
   finding.fields = {CalibrationField::mounting_of_right};
   wrong.findings = {finding};
-  const Result<Mended> refused = mend(handheld().rig, wrong, replay, CalibrationStyle::kalibr);
+  const Result<CorrectedRig> refused = correct_rig(handheld().rig, wrong, replay, CalibrationStyle::kalibr);
   ASSERT_TRUE(refused.ok());
   EXPECT_FALSE(refused->rig);
   EXPECT_NE(refused->why_not.find("as much is wrong with the corrected calibration"), std::string::npos) << refused->why_not;
 }
 
-}  // namespace mend_test
+}  // namespace corrected_rig_test
 }  // namespace fbvins

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Injects faults into good recordings: mistakes made with a rig, a driver or a calibration. For tests and the tables of
-// docs/doctor.md. A spoiler is one such fault. Its functions may keep state: take a fresh one from spoilers() for each recording.
+// docs/doctor.md. The functions of a fault may keep state: take a fresh one from setup_faults() for each recording.
 //
-//   for (const Spoiler& spoiler : spoilers(rig)) {
-//     spoiler.rig(wrong_rig);
-//     if (!spoiler.lost(sample)) spoiler.reading(sample);
-//     spoiler.frame(frame);                               // each where it is set
+//   for (const SetupFault& fault : setup_faults(rig)) {
+//     fault.rig(wrong_rig);
+//     if (!fault.lost(sample)) fault.reading(sample);
+//     fault.frame(frame);                               // each where it is set
 //   }
 #pragma once
 
@@ -19,7 +19,7 @@
 
 namespace fbvins {
 
-struct Spoiler {
+struct SetupFault {
   std::string name;
   FindingKind kind = FindingKind::gyro_units;  ///< what the doctor should find
   double size = 0;                             ///< and how large, in that finding's unit; 0: not checked
@@ -31,6 +31,6 @@ struct Spoiler {
 };
 
 /// All faults, for a recording with this rig.
-std::vector<Spoiler> spoilers(const StereoRig& rig);
+std::vector<SetupFault> setup_faults(const StereoRig& rig);
 
 }  // namespace fbvins

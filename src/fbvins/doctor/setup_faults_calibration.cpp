@@ -5,12 +5,12 @@
 
 #include "fbvins/camera/scaled_lens.hpp"
 #include "fbvins/doctor/lens_change.hpp"
-#include "fbvins/doctor/spoiler_lists.hpp"
+#include "fbvins/doctor/setup_fault_lists.hpp"
 
-namespace fbvins::spoil {
+namespace fbvins::setup_fault {
 namespace {
 
-Spoiler calibration_turned(std::string name, const Vec3& axis, double degrees) {
+SetupFault calibration_turned(std::string name, const Vec3& axis, double degrees) {
   return {std::move(name),
           FindingKind::imu_camera_rotation,
           degrees,
@@ -23,7 +23,7 @@ Spoiler calibration_turned(std::string name, const Vec3& axis, double degrees) {
           {},
           {}};
 }
-Spoiler right_turned(std::string name, const Vec3& axis, double degrees) {
+SetupFault right_turned(std::string name, const Vec3& axis, double degrees) {
   return {std::move(name),
           FindingKind::right_camera_turned,
           degrees,
@@ -34,7 +34,7 @@ Spoiler right_turned(std::string name, const Vec3& axis, double degrees) {
           {},
           {}};
 }
-Spoiler focal(std::string name, bool left, bool right, double factor) {
+SetupFault focal(std::string name, bool left, bool right, double factor) {
   const double percent = 100 * (factor - 1);
   return {std::move(name),
           FindingKind::focal_length,
@@ -47,7 +47,7 @@ Spoiler focal(std::string name, bool left, bool right, double factor) {
           {},
           {}};
 }
-Spoiler baseline(std::string name, double factor, const StereoRig& rig) {
+SetupFault baseline(std::string name, double factor, const StereoRig& rig) {
   const double wrong_mm = 1e3 * rig.T_C1C0().p.norm() * (factor - 1);
   return {std::move(name),
           FindingKind::baseline_length,
@@ -62,12 +62,12 @@ void forget_distortion(Camera& camera) {
   std::visit([](auto& m) { m = {m.fx, m.fy, m.cx, m.cy}; }, model);
   camera = camera.with_lens(model);
 }
-Spoiler changed_by(std::string name, FindingKind kind, std::function<void(StereoRig&)> change, double size = 0,
-                   double tolerance = 0) {
+SetupFault changed_by(std::string name, FindingKind kind, std::function<void(StereoRig&)> change, double size = 0,
+                      double tolerance = 0) {
   return {std::move(name), kind, size, tolerance, std::move(change), {}, {}};
 }
 
-std::vector<Spoiler> inverted() {
+std::vector<SetupFault> inverted() {
   const auto left = [](const StereoRig& r) { return r.T_BC0.inverse().cast_frames<B, C0>(); };
   const auto right = [](const StereoRig& r) { return r.T_BC1.inverse().cast_frames<B, C1>(); };
   constexpr FindingKind kKind = FindingKind::extrinsics_inverted;
@@ -85,7 +85,7 @@ std::vector<Spoiler> inverted() {
   };
 }
 
-std::vector<Spoiler> of_another_kind() {
+std::vector<SetupFault> of_another_kind() {
   const auto sized = [](double factor) {
     return [factor](StereoRig& r) { r.left = with_scaled_lens(r.left, factor), r.right = with_scaled_lens(r.right, factor); };
   };
@@ -129,8 +129,8 @@ std::vector<Spoiler> of_another_kind() {
 
 }  // namespace
 
-std::vector<Spoiler> of_the_calibration(const StereoRig& rig) {
-  std::vector<Spoiler> all{
+std::vector<SetupFault> of_the_calibration(const StereoRig& rig) {
+  std::vector<SetupFault> all{
       calibration_turned("mounting wrong by 5 degrees about y", Vec3::UnitY(), 5),
       calibration_turned("mounting wrong by 2 degrees about z", Vec3::UnitZ(), 2),
       calibration_turned("mounting wrong by 90 degrees about x", Vec3::UnitX(), 90),
@@ -162,9 +162,9 @@ std::vector<Spoiler> of_the_calibration(const StereoRig& rig) {
       baseline("baseline twice as long", 2, rig),
       {"rate of the IMU twice as high", FindingKind::imu_stamps, 0, 0, [](StereoRig& r) { r.imu_noise.rate_hz *= 2; }, {}, {}},
   };
-  for (std::vector<Spoiler>& more : std::array{inverted(), of_another_kind()})
-    for (Spoiler& spoiler : more) all.push_back(std::move(spoiler));
+  for (std::vector<SetupFault>& more : std::array{inverted(), of_another_kind()})
+    for (SetupFault& fault : more) all.push_back(std::move(fault));
   return all;
 }
 
-}  // namespace fbvins::spoil
+}  // namespace fbvins::setup_fault
