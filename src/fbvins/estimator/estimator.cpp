@@ -224,15 +224,9 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     predicted = predict(frame, imu);
   }
   if (verdict.imu_contradicts) predicted.state.T_FB = *verdict.seen;
-  std::vector<TrackedFeature> accepted = frame.features;
-  if (!verdict.wrong) return accepted;
+  if (!verdict.wrong) return frame.features;
   wrong_cameras_ = static_cast<std::uint8_t>(1u << verdict.wrong->left | 1u << verdict.wrong->right);
-  for (TrackedFeature& feature : accepted) {
-    if (verdict.wrong->has(feature.cameras.left)) feature.left.reset();
-    if (verdict.wrong->has(feature.cameras.right)) feature.right.reset();
-  }
-  std::erase_if(accepted, [](const TrackedFeature& f) { return !f.left && !f.right; });
-  return accepted;
+  return without_cameras(frame.features, *verdict.wrong);
 }
 
 const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {

@@ -9,8 +9,8 @@
 namespace fbvins {
 namespace estimator_consistency_test {
 
-using test::exact_noise;
 using test::EstimatedFlight;
+using test::exact_noise;
 using test::fly;
 using test::FourCameras;
 using test::Motion;

@@ -52,6 +52,15 @@ Frame without_state(const TrackedFrame& tracked) {
   return f;
 }
 
+std::vector<TrackedFeature> without_cameras(std::vector<TrackedFeature> features, const CameraPair& cameras) {
+  for (TrackedFeature& feature : features) {
+    if (cameras.has(feature.cameras.left)) feature.left.reset();
+    if (cameras.has(feature.cameras.right)) feature.right.reset();
+  }
+  std::erase_if(features, [](const TrackedFeature& f) { return !f.left && !f.right; });
+  return features;
+}
+
 Frame frame_of_start(const InitialSolution& start, std::size_t number, const ImuNoise& noise) {
   Frame f = without_state(start.frames[number]);
   f.state = start.states[number];
