@@ -6,9 +6,9 @@
 #include <cmath>
 #include <utility>
 
+#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
-#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
