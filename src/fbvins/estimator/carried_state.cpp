@@ -31,7 +31,7 @@ void CarriedState::compare(const SlidingWindow& window, const Solved& solved) {
   if (disputed_ || (unproven_s_ > 0 && solved.contradicted)) unproven_s_ = kProven_s;
   else unproven_s_ = std::max(0.0, unproven_s_ - step_s_);
   disputed_ = false;
-  tilt_away_B_ = up_.contradiction(up_B(window), newest.bias.gyro_radps);
+  tilt_away_ = up_.difference(up_B(window), newest.bias.gyro_radps);
   if (solved.clipped) velocity_.forget();
   const Odometry& odometry = solved.odometry;
   if (odometry.velocity_covariance.isZero(0)) return;
@@ -54,7 +54,7 @@ void CarriedState::restart(bool disputed) {
 }
 
 void CarriedState::begin_window() {
-  tilt_away_B_.reset();
+  tilt_away_.reset();
   unproven_s_ = 0;
   covariances_.reset();
 }
@@ -75,7 +75,7 @@ void CarriedState::fill_covariances(Odometry& out) {
 }
 
 void CarriedState::add_doubt(Odometry& out) const {
-  if (tilt_away_B_) out.pose_covariance.bottomRightCorner<3, 3>() += *tilt_away_B_ * tilt_away_B_->transpose();
+  if (tilt_away_) out.pose_covariance.bottomRightCorner<3, 3>() += tilt_away_->turn_B * tilt_away_->turn_B.transpose();
   const Vec3 &shift_G = velocity_.shift_G(), &velocity_G = velocity_.velocity_G();
   out.pose_covariance.topLeftCorner<3, 3>() += shift_G * shift_G.transpose();
   out.velocity_covariance += velocity_G * velocity_G.transpose();

@@ -37,7 +37,7 @@ class CarriedState {
   /// Another window begins.
   void begin_window();
 
-  bool contradicted() const { return tilt_away_B_ || velocity_.contradicted() || unproven_s_ > 0; }
+  bool contradicted() const { return (tilt_away_ && tilt_away_->contradiction) || velocity_.contradicted() || unproven_s_ > 0; }
   /// A contradiction is over that has moved the pose by more than a good one may be wrong. True once.
   bool take_reset() { return velocity_.take_reset(); }
 
@@ -56,10 +56,10 @@ class CarriedState {
 
   CarriedUp up_;
   CarriedVelocity velocity_;
-  std::optional<Vec3> tilt_away_B_;  ///< of a new window, from what was known before it, rad
-  bool disputed_ = false;            ///< the window before was
-  double unproven_s_ = 0;            ///< so long images and readings have to agree in a new one
-  double step_s_ = 0;                ///< of the newest frame
+  std::optional<CarriedUp::Difference> tilt_away_;  ///< of a new window, from what was known before it
+  bool disputed_ = false;                           ///< the window before was
+  double unproven_s_ = 0;                           ///< so long images and readings have to agree in a new one
+  double step_s_ = 0;                               ///< of the newest frame
   Time now_;
   std::optional<Covariances> covariances_;  ///< of the newest state that had any
 };

@@ -16,6 +16,8 @@ constexpr double kRemembered_s = 30;
 /// No pose is good whose tilt is off by more; and by so many standard deviations of what is carried on.
 constexpr double kTilt_rad = 3 * kDegree, kTilt_sigma = 2;
 
+Vec3 turn_between(const Vec3& from, const Vec3& to) { return so3_log(Quat::FromTwoVectors(from, to)); }
+
 Vec3 carried(const Vec3& up_B, const ImuSegment& readings, const Vec3& gyro_bias_radps) {
   return integrate_gyro(readings, gyro_bias_radps).conjugate() * up_B;
 }
@@ -38,7 +40,8 @@ void CarriedUp::take(const Known& known) {
   for (auto e = first; e != recent_.end() && (now_ - e->t).seconds() >= kBefore_s; ++e)
     if (e->known) first = e;
   recent_.erase(recent_.begin(), first);
-  if ((now_ - recent_.front().t).seconds() >= kBefore_s) before_.reset();  // confirmed
+  const bool agree = before_ && turn_between(known.up_B, before_->up_B).norm() <= kTilt_rad;
+  if (agree && (now_ - recent_.front().t).seconds() >= kBefore_s) before_.reset();  // confirmed
 }
 
 void CarriedUp::restart() {
@@ -50,15 +53,14 @@ void CarriedUp::restart() {
   recent_.clear();
 }
 
-std::optional<Vec3> CarriedUp::contradiction(const Vec3& up_B, const Vec3& gyro_bias_radps) const {
+std::optional<CarriedUp::Difference> CarriedUp::difference(const Vec3& up_B, const Vec3& gyro_bias_radps) const {
   if (!before_) return std::nullopt;
   const double dt_s = (now_ - since_).seconds();
   const double sigma_rad =
       Vec3(before_->sigma_rad, before_->gyro_sigma_radps * dt_s, (gyro_bias_radps - before_->gyro_bias_radps).norm() * dt_s)
           .norm();
-  const Vec3 turn = so3_log(Quat::FromTwoVectors(up_B, before_->up_B));
-  if (turn.norm() <= kTilt_rad + kTilt_sigma * sigma_rad) return std::nullopt;
-  return turn;
+  const Vec3 turn_B = turn_between(up_B, before_->up_B);
+  return Difference{turn_B, turn_B.norm() > kTilt_rad + kTilt_sigma * sigma_rad};
 }
 
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 //   up.carry(frame.t, frame.imu);                 every frame
 //   up.take({...});                               after a good pose
 //   up.restart();                                 the window is gone
-//   if (up.contradiction(up_B, gyro_bias)) ...    of the new one
+//   if (auto d = up.difference(up_B, bias)) ...   of the new one
 //
 // One owner, one thread.
 #pragma once
@@ -36,9 +36,13 @@ class CarriedUp {
   void restart();
   /// The gyroscope cannot be relied on.
   void forget() { *this = {}; }
-  /// The rotation vector in B from the up of the new window to the one carried on, where they contradict each other.
-  /// `gyro_bias_radps`: of the new window; a gyroscope whose bias has moved carries nothing far.
-  std::optional<Vec3> contradiction(const Vec3& up_B, const Vec3& gyro_bias_radps) const;
+  struct Difference {
+    Vec3 turn_B;                 ///< rotation vector in B from the up of the new window to the one carried on, rad
+    bool contradiction = false;  ///< larger than what both may be wrong by (I14a)
+  };
+  /// After a restart, as long as that is remembered and not confirmed. `gyro_bias_radps`: of the new window; a gyroscope whose
+  /// bias has moved carries nothing far.
+  std::optional<Difference> difference(const Vec3& up_B, const Vec3& gyro_bias_radps) const;
 
  private:
   struct Entry {

@@ -8,6 +8,12 @@
 namespace fbvins {
 namespace carried_up_test {
 
+/// Where the two contradict each other.
+std::optional<Vec3> contradiction(const CarriedUp& up, const Vec3& up_B, const Vec3& gyro_bias_radps) {
+  const auto difference = up.difference(up_B, gyro_bias_radps);
+  return difference && difference->contradiction ? std::optional(difference->turn_B) : std::nullopt;
+}
+
 const Vec3 kRate(0.5, -0.2, 0.3), kBias(0.01, 0.02, -0.01);
 
 /// A vehicle that turns steadily, whose window is good until `good_s`.
@@ -37,8 +43,8 @@ TEST(CarriedUp, ContradictsAStartWithAnotherTilt) {
   vehicle.fly(0.5, false);
   vehicle.up.restart();
   vehicle.fly(1, false);
-  EXPECT_FALSE(vehicle.up.contradiction(so3_exp(Vec3(2 * kDegree, 0, 0)) * vehicle.truth(), kBias));
-  const auto away = vehicle.up.contradiction(so3_exp(Vec3(8 * kDegree, 0, 0)) * vehicle.truth(), kBias);
+  EXPECT_FALSE(contradiction(vehicle.up, so3_exp(Vec3(2 * kDegree, 0, 0)) * vehicle.truth(), kBias));
+  const auto away = contradiction(vehicle.up, so3_exp(Vec3(8 * kDegree, 0, 0)) * vehicle.truth(), kBias);
   ASSERT_TRUE(away);
   EXPECT_LT(away->norm(), 8.1 * kDegree);
   EXPECT_LT((so3_exp(*away) * (so3_exp(Vec3(8 * kDegree, 0, 0)) * vehicle.truth()) - vehicle.truth()).norm(), 0.002);
@@ -50,32 +56,47 @@ TEST(CarriedUp, IsFromTwoSecondsBeforeTheEndOfTheGoodPoses) {
   vehicle.fly(1.5, true, Vec3(6 * kDegree, 0, 0));  // what failed had already spoiled the tilt
   vehicle.up.restart();
   vehicle.fly(0.5, false);
-  EXPECT_FALSE(vehicle.up.contradiction(vehicle.truth(), kBias));
+  EXPECT_FALSE(contradiction(vehicle.up, vehicle.truth(), kBias));
 }
 
 TEST(CarriedUp, SaysNothingWhereTheGyroscopeCannotCarryIt) {
   const auto other = [](const Turning& vehicle) { return so3_exp(Vec3(12 * kDegree, 0, 0)) * vehicle.truth(); };
   Turning vehicle;
-  EXPECT_FALSE(vehicle.up.contradiction(other(vehicle), kBias));  // the first start
+  EXPECT_FALSE(contradiction(vehicle.up, other(vehicle), kBias));  // the first start
   vehicle.fly(5, true);
   vehicle.up.restart();
   vehicle.fly(1, false);
-  ASSERT_TRUE(vehicle.up.contradiction(other(vehicle), kBias));
-  EXPECT_FALSE(vehicle.up.contradiction(other(vehicle), kBias + Vec3(0, 0, 0.05)));  // its bias has moved
+  ASSERT_TRUE(contradiction(vehicle.up, other(vehicle), kBias));
+  EXPECT_FALSE(contradiction(vehicle.up, other(vehicle), kBias + Vec3(0, 0, 0.05)));  // its bias has moved
   Turning later = vehicle;
   later.fly(30, false);
-  EXPECT_FALSE(later.up.contradiction(other(later), kBias));
+  EXPECT_FALSE(contradiction(later.up, other(later), kBias));
   vehicle.up.carry(Time{} + Duration::from_seconds(7), {});  // readings are missing
-  EXPECT_FALSE(vehicle.up.contradiction(other(vehicle), kBias));
+  EXPECT_FALSE(contradiction(vehicle.up, other(vehicle), kBias));
 }
 
-TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPoses) {
+TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPosesThatAgree) {
+  const auto remembered_after = [](double tilt_deg) {
+    Turning vehicle;
+    vehicle.fly(5, true);
+    vehicle.up.restart();
+    vehicle.fly(0.5, false);
+    vehicle.fly(2.2, true, Vec3(tilt_deg * kDegree, 0, 0));
+    return vehicle.up.difference(-vehicle.truth(), kBias).has_value();
+  };
+  EXPECT_FALSE(remembered_after(1));
+  EXPECT_TRUE(remembered_after(4));
+}
+
+TEST(CarriedUp, IsADifferenceWhereItIsNoContradiction) {
   Turning vehicle;
   vehicle.fly(5, true);
   vehicle.up.restart();
-  vehicle.fly(0.5, false);
-  vehicle.fly(2.2, true);
-  EXPECT_FALSE(vehicle.up.contradiction(-vehicle.truth(), kBias));
+  vehicle.fly(1, false);
+  const auto difference = vehicle.up.difference(so3_exp(Vec3(2 * kDegree, 0, 0)) * vehicle.truth(), kBias);
+  ASSERT_TRUE(difference);
+  EXPECT_FALSE(difference->contradiction);
+  EXPECT_LT((so3_exp(difference->turn_B) * (so3_exp(Vec3(2 * kDegree, 0, 0)) * vehicle.truth()) - vehicle.truth()).norm(), 0.002);
 }
 
 }  // namespace carried_up_test
