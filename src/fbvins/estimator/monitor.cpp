@@ -34,10 +34,10 @@ constexpr double kLasting_sigma = 1.5, kLastingScale = 0.4, kLasting_s = 0.5;
 /// What is left of a sudden drift does not last: it is forgotten after this time.
 constexpr double kForgotten_s = 1;
 /// The window's turns against the readings', in standard deviations, beyond what axes that are off by this share of the turn
-/// explain: up to 3 where all is well, up to 6.4 where images are rendered along a measured trajectory. From the first on they
-/// contradict each other, until they are below the second.
-constexpr double kTurn_sigma = 7, kTurnOver_sigma = 3, kTurnScale = 0.002;
-/// By then the pose has moved by about as much, in each direction.
+/// explain: up to 3 where all is well, up to 6.4 where images are rendered along a measured trajectory. From the first on the
+/// readings count less, from the second on they contradict each other, until they are below the third.
+constexpr double kTurnSuspected_sigma = 5, kTurn_sigma = 7, kTurnOver_sigma = 3, kTurnScale = 0.002;
+/// By then the pose may have moved by about as much, in each direction.
 constexpr double kTurnedAway_m = 0.1;
 /// The other camera, where only one drifts. A camera that was excluded for drift alone is used again after this time: the
 /// landmarks triangulated without it may be what is wrong.
@@ -159,13 +159,15 @@ void Monitor::restart() {
 void Monitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt) {
   if (turns.sigma_rad <= 0) return;
   const double off = (turns.off_G.norm() - kTurnScale * turns.turned_rad) / (turns.sigma_rad * (calibrating_ ? kCalibrating : 1));
-  const bool before = turning_noise_ > 1;
-  if (off < (before ? kTurnOver_sigma : kTurn_sigma)) {
+  if (off < (turning_noise_ > 1 ? kTurnOver_sigma : kTurnSuspected_sigma)) {
     turning_noise_ = 1;
+    turns_contradict_ = false;
     return;
   }
   turning_noise_ = std::max(turning_noise_, off);
-  if (!before) turned_away_ = true, shifts_G_ += kTurnedAway_m * kTurnedAway_m * Mat3::Identity();
+  if (!may_be_away_) may_be_away_ = true, shifts_G_ += kTurnedAway_m * kTurnedAway_m * Mat3::Identity();
+  if (off < kTurn_sigma && !turns_contradict_) return;
+  if (!turns_contradict_) turns_contradict_ = turned_away_ = true;
   const Vec3 turn_G = dt.seconds() / turns.span.seconds() * turns.off_G;
   take_doubt(now, now.q.conjugate() * turn_G, turn_G.cross(ahead_G_));
   contradicted_ = true;
@@ -350,7 +352,7 @@ void Monitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const 
 
 bool Monitor::take_reset() {
   if (contradicted() || (shift_G_.norm() < kReset_m && turn_G_.norm() < kReset_rad && !turned_away_)) return false;
-  turned_away_ = false;
+  turned_away_ = may_be_away_ = false;
   turn_G_.setZero(), shift_G_.setZero(), turns_G_.setZero(), shifts_G_.setZero();
   count_reset();
   return true;

@@ -108,7 +108,8 @@ class Monitor {
   Vec3 where_G_ = Vec3::Zero();                            ///< where the turn began
   Vec3 ahead_G_ = Vec3::Zero();                            ///< from the pose to the middle of what is in view
   double turning_noise_ = 1;                               ///< of the gyroscope, while the window turns in another way than it
-  bool turned_away_ = false;                               ///< so that the pose has moved
+  bool turns_contradict_ = false;                          ///< and that is more than a suspicion
+  bool may_be_away_ = false, turned_away_ = false;         ///< the pose may have moved, and has, since the last reset
   Vec3 tilt_G_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
   int settling_ = 0;                                       ///< images after darkness that are not judged
   std::optional<Time> begun_;
