@@ -31,6 +31,8 @@ void CarriedState::compare(const SlidingWindow& window, const Solved& solved) {
   if (disputed_ || (unproven_s_ > 0 && solved.contradicted)) unproven_s_ = kProven_s;
   else unproven_s_ = std::max(0.0, unproven_s_ - step_s_);
   disputed_ = false;
+  if (solved.contradicted && !contradicted_before_) up_.hold();
+  contradicted_before_ = solved.contradicted;
   tilt_away_ = up_.difference(up_B(window), newest.bias.gyro_radps);
   if (solved.clipped) velocity_.forget();
   const Odometry& odometry = solved.odometry;
@@ -55,6 +57,7 @@ void CarriedState::restart(bool disputed) {
 
 void CarriedState::begin_window() {
   tilt_away_.reset();
+  contradicted_before_ = false;
   unproven_s_ = 0;
   covariances_.reset();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was known before, carried on by the readings: up through a restart, the velocity through images in which all is new, and
-// the covariances through a solve without any. Where the window contradicts it, the pose is not good and the difference is in the
-// covariance (docs/derivations/integrity.md, I14a and I14b).
+// What was known before, carried on by the readings: up through a restart or a contradiction, the velocity through images in
+// which all is new, and the covariances through a solve without any. Where the window contradicts it, the pose is not good and
+// the difference is in the covariance (docs/derivations/integrity.md, I14a and I14b).
 //
 // One owner, one thread.
 #pragma once
@@ -56,7 +56,8 @@ class CarriedState {
 
   CarriedUp up_;
   CarriedVelocity velocity_;
-  std::optional<CarriedUp::Difference> tilt_away_;  ///< of a new window, from what was known before it
+  std::optional<CarriedUp::Difference> tilt_away_;  ///< of the window, from what was known before a restart or a contradiction
+  bool contradicted_before_ = false;                ///< images and readings, in the frame before
   bool disputed_ = false;                           ///< the window before was
   double unproven_s_ = 0;                           ///< so long images and readings have to agree in a new one
   double step_s_ = 0;                               ///< of the newest frame

@@ -44,13 +44,24 @@ void CarriedUp::take(const Known& known) {
   if (agree && (now_ - recent_.front().t).seconds() >= kBefore_s) before_.reset();  // confirmed
 }
 
-void CarriedUp::restart() {
+void CarriedUp::keep() {
   if (!recent_.empty() && recent_.front().known) {
     before_ = recent_.front().known, since_ = recent_.front().t;
     for (auto e = std::next(recent_.begin()); e != recent_.end(); ++e)
       before_->up_B = carried(before_->up_B, e->readings, before_->gyro_bias_radps);
   }
   recent_.clear();
+}
+
+void CarriedUp::hold() {
+  if (before_) return;
+  keep();
+  restarted_ = false;
+}
+
+void CarriedUp::restart() {
+  keep();
+  restarted_ = true;
 }
 
 std::optional<CarriedUp::Difference> CarriedUp::difference(const Vec3& up_B, const Vec3& gyro_bias_radps) const {
@@ -60,7 +71,7 @@ std::optional<CarriedUp::Difference> CarriedUp::difference(const Vec3& up_B, con
       Vec3(before_->sigma_rad, before_->gyro_sigma_radps * dt_s, (gyro_bias_radps - before_->gyro_bias_radps).norm() * dt_s)
           .norm();
   const Vec3 turn_B = turn_between(up_B, before_->up_B);
-  return Difference{turn_B, turn_B.norm() > kTilt_rad + kTilt_sigma * sigma_rad};
+  return Difference{turn_B, restarted_ && turn_B.norm() > kTilt_rad + kTilt_sigma * sigma_rad};
 }
 
 }  // namespace fbvins

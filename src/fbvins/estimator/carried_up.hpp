@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The direction up, through a restart: as the window knew it two seconds before its last good pose, carried on by the gyroscope.
-// A start takes the tilt from the accelerometer, and where that is what failed, this is what contradicts it
+// The direction up, through a restart or a contradiction: as the window knew it two seconds before its last good pose, carried on
+// by the gyroscope. A start takes the tilt from the accelerometer, and where that is what failed, this is what contradicts it
 // (docs/derivations/integrity.md, I14a).
 //
 //   up.carry(frame.t, frame.imu);                 every frame
 //   up.take({...});                               after a good pose
+//   up.hold();                                    images and readings contradict each other
 //   up.restart();                                 the window is gone
-//   if (auto d = up.difference(up_B, bias)) ...   of the new one
+//   if (auto d = up.difference(up_B, bias)) ...   of the window since
 //
 // One owner, one thread.
 #pragma once
@@ -33,6 +34,8 @@ class CarriedUp {
   /// Readings since the frame before. With a hole in them nothing is known any more.
   void carry(Time t, const ImuSegment& readings);
   void take(const Known& known);
+  /// What is carried on is from before a contradiction that begins, until it is confirmed.
+  void hold();
   void restart();
   /// The gyroscope cannot be relied on.
   void forget() { *this = {}; }
@@ -50,9 +53,12 @@ class CarriedUp {
     ImuSegment readings;  ///< that end there
     std::optional<Known> known;
   };
+  void keep();
+
   std::deque<Entry> recent_;  ///< begins with a known one
   std::optional<Known> before_;
-  Time since_, now_;  ///< of `before_`, and until when it was carried
+  bool restarted_ = false;  ///< since then
+  Time since_, now_;        ///< of `before_`, and until when it was carried
 };
 
 }  // namespace fbvins

@@ -88,6 +88,24 @@ TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPosesThatAgree) {
   EXPECT_TRUE(remembered_after(4));
 }
 
+TEST(CarriedUp, ThroughAContradictionIsFromBeforeIt) {
+  const Vec3 tilt(6 * kDegree, 0, 0);
+  Turning vehicle;
+  vehicle.fly(5, true);
+  EXPECT_FALSE(vehicle.up.difference(so3_exp(tilt) * vehicle.truth(), kBias));
+  vehicle.up.hold();
+  vehicle.fly(2, false);
+  vehicle.fly(2.2, true, tilt);  // called good
+  vehicle.up.hold();             // a second one
+  vehicle.fly(1, false);
+  const auto difference = vehicle.up.difference(so3_exp(tilt) * vehicle.truth(), kBias);
+  ASSERT_TRUE(difference);
+  EXPECT_FALSE(difference->contradiction) << "the gyroscope may be what was wrong";
+  EXPECT_LT((so3_exp(difference->turn_B) * (so3_exp(tilt) * vehicle.truth()) - vehicle.truth()).norm(), 0.002);
+  vehicle.fly(2.2, true);
+  EXPECT_FALSE(vehicle.up.difference(vehicle.truth(), kBias)) << "confirmed";
+}
+
 TEST(CarriedUp, IsADifferenceWhereItIsNoContradiction) {
   Turning vehicle;
   vehicle.fly(5, true);
