@@ -59,8 +59,7 @@ struct Flown {
 };
 
 /// `blank`: images show nothing for a while.
-Flown fly(const std::string& frontend, bool blank, bool depth_meanwhile,
-          const test::RenderedRecording& recording = recorded()) {
+Flown fly(const std::string& frontend, bool blank, bool depth_meanwhile, const test::RenderedRecording& recording = recorded()) {
   Config config;
   config.frontend.kind = frontend;
   Result<System> system = System::create(config, recording.rig);

@@ -139,7 +139,8 @@ Result<void> RealsenseCamera::choose() {
   for (const Wanted& wanted : all_wanted)
     if (find(wanted) == chosen.end())
       return Error{ErrorCode::unsupported, fmt::format("the camera {} has no {}", realsense_name(device_), wanted.name)};
-  const auto left = find(all_wanted[0])->as<rs2::video_stream_profile>(), second = find(all_wanted[1])->as<rs2::video_stream_profile>();
+  const auto left = find(all_wanted[0])->as<rs2::video_stream_profile>(),
+             second = find(all_wanted[1])->as<rs2::video_stream_profile>();
   width_px_ = left.width(), height_px_ = left.height();
   mode_ = mode_text(width_px_, height_px_, left.fps());
   if (wanted_.width_px > 0 &&

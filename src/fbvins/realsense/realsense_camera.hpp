@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One RealSense camera with an IMU, plugged in or played from a file: its factory calibration, and its streams as sensor events.
-// Left and right infrared, or the left one and the depth images that the device makes of both, emitter off; gyroscope and accelerometer as one IMU, which is B; stamps in the library's global time,
-// the same for all streams. The library's exceptions become Errors.
+// Left and right infrared, or the left one and the depth images that the device makes of both, emitter off; gyroscope and
+// accelerometer as one IMU, which is B; stamps in the library's global time, the same for all streams. The library's exceptions
+// become Errors.
 #pragma once
 
 #include <array>
