@@ -154,8 +154,10 @@ Result<void> RealsenseCamera::choose() {
     double baseline_mm = 50;  // the D435i's
     for (const Stream& stream : streams_) {
       if (!stream.is_stereo) continue;
-      if (stream.sensor.supports(RS2_OPTION_STEREO_BASELINE)) baseline_mm = stream.sensor.get_option(RS2_OPTION_STEREO_BASELINE);
-      if (stream.sensor.supports(RS2_OPTION_DEPTH_UNITS)) unit_mm_ = 1e3 * stream.sensor.get_option(RS2_OPTION_DEPTH_UNITS);
+      if (stream.sensor.supports(RS2_OPTION_STEREO_BASELINE))
+        baseline_mm = static_cast<double>(stream.sensor.get_option(RS2_OPTION_STEREO_BASELINE));
+      if (stream.sensor.supports(RS2_OPTION_DEPTH_UNITS))
+        unit_mm_ = 1e3 * static_cast<double>(stream.sensor.get_option(RS2_OPTION_DEPTH_UNITS));
     }
     rig_ = realsense_rig(left, second, find(all_wanted[2])->as<rs2::motion_stream_profile>(), 1e-3 * std::abs(baseline_mm));
   } catch (const rs2::error& e) {
