@@ -125,7 +125,7 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
                      {.noise_at_1m_m = o.depth.noise_at_1m_m, .nearest_m = o.depth.nearest_m, .farthest_m = o.depth.farthest_m});
     if (o.depth.apart_m > 0) rig.depth->own = depth_camera(rig.T_BC0, o.depth.apart_m);
   }
-  for (int i = 1; i < rig.camera_count(); ++i) {
+  for (int i = 1; o.camera.later_ms > 0 && i < rig.camera_count(); ++i) {
     Camera& camera = i == 1 ? rig.right : rig.more[static_cast<std::size_t>(i - 2)].camera;
     camera.set_own_times({.time_offset_s = 1e-3 * i * o.camera.later_ms});
   }
