@@ -73,8 +73,8 @@ void print_text(const Dataset& data) {
   if (data.rig().has_right()) print_camera("right", data.rig().right, info.right);
   print_further_cameras(data.rig(), info.more);
   if (const auto& depth = data.rig().depth)
-    fmt::print("{:<14}{} images, {} to {} m, noise {:.4f} m at 1 m\n", "depth", info.depth.listed, depth->nearest_m,
-               depth->farthest_m, depth->noise_at_1m_m);
+    fmt::print("{:<14}{} images, {} to {} m, noise {:.4f} m at 1 m{}\n", "depth", info.depth.listed, depth->nearest_m,
+               depth->farthest_m, depth->noise_at_1m_m, depth->own ? ", with a lens and a pose of its own" : "");
   const std::string baseline =
       data.rig().has_right() ? fmt::format("baseline {:.4f} m, ", data.rig().T_C1C0().p.norm()) : std::string();
   fmt::print("{:<14}{}{}\n", "rig", baseline, times_of(data.rig()));

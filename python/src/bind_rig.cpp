@@ -139,20 +139,38 @@ void bind_sensors(nb::module_& m) {
       .def_ro("accel_random_walk", &ImuNoise::accel_random_walk_mps3_rthz, "m/s^3/sqrt(Hz)")
       .def_ro("rate_hz", &ImuNoise::rate_hz);
 
-  nb::class_<DepthSensor>(m, "DepthSensor", "A sensor of depth images that are registered to the left camera, pixel by pixel.")
+  nb::class_<DepthSensor>(
+      m, "DepthSensor",
+      "A sensor of depth images that are registered to the left camera, pixel by pixel, or have a lens and a pose "
+      "of their own.")
       .def(
           "__init__",
-          [](DepthSensor* self, double noise_at_1m, double nearest, double farthest, double scale_sigma) {
-            new (self) DepthSensor{noise_at_1m, nearest, farthest, scale_sigma};
+          [](DepthSensor* self, double noise_at_1m, double nearest, double farthest, double scale_sigma, const Camera* camera,
+             nb::handle T_BD) {
+            if ((camera == nullptr) != T_BD.is_none())
+              throw nb::value_error("camera and T_BD go together: give both, or neither");
+            std::optional<MountedCamera> own;
+            if (camera != nullptr) own = MountedCamera{*camera, transform<B, C0>(T_BD, "T_BD")};
+            new (self) DepthSensor{noise_at_1m, nearest, farthest, scale_sigma, own};
           },
           nb::kw_only(), "noise_at_1m"_a = DepthSensor{}.noise_at_1m_m, "nearest"_a = DepthSensor{}.nearest_m,
-          "farthest"_a = DepthSensor{}.farthest_m, "scale_sigma"_a = DepthSensor{}.scale_sigma,
+          "farthest"_a = DepthSensor{}.farthest_m, "scale_sigma"_a = DepthSensor{}.scale_sigma, "camera"_a.none() = nb::none(),
+          "T_BD"_a = nb::none(),
           "noise_at_1m: standard deviation at one metre, m; it grows with the square of the distance. nearest, farthest: what is\n"
-          "used, m. scale_sigma: relative standard deviation of what all distances are wrong by together.")
+          "used, m. scale_sigma: relative standard deviation of what all distances are wrong by together.\n"
+          "camera, T_BD: of a sensor whose images are not registered, in whose pixels they are and along whose z it measures;\n"
+          "float64 (4, 4), takes its coordinates to the IMU's, m.")
       .def_ro("noise_at_1m", &DepthSensor::noise_at_1m_m, "m")
       .def_ro("nearest", &DepthSensor::nearest_m, "m")
       .def_ro("farthest", &DepthSensor::farthest_m, "m")
-      .def_ro("scale_sigma", &DepthSensor::scale_sigma);
+      .def_ro("scale_sigma", &DepthSensor::scale_sigma)
+      .def_prop_ro(
+          "camera", [](const DepthSensor& sensor) { return sensor.own ? std::optional(sensor.own->camera) : std::nullopt; },
+          "its own; None: the images are registered to the left camera")
+      .def_prop_ro(
+          "T_BD",
+          [](const DepthSensor& sensor) { return sensor.own ? nb::cast(to_array(sensor.own->T_BC)) : nb::object(nb::none()); },
+          nb::sig("def T_BD(self) -> numpy.ndarray | None"), "(4, 4), its own pose; None without");
 }
 
 void bind_stereo_rig(nb::module_& m) {

@@ -36,8 +36,9 @@ std::shared_ptr<const Image> image_of(nb::handle object, const char* name, const
 std::shared_ptr<const DepthImage> depth_of(nb::handle object, const StereoRig& rig) {
   if (object.is_none()) return nullptr;
   if (!rig.depth) throw nb::value_error("depth: the rig has no depth sensor");
-  const auto array = checked<std::uint16_t>(object, "depth", {rig.left.height(), rig.left.width()});
-  auto depth = std::make_shared<DepthImage>(DepthImage{rig.left.width(), rig.left.height(), {}});
+  const Camera& camera = rig.depth_camera();
+  const auto array = checked<std::uint16_t>(object, "depth", {camera.height(), camera.width()});
+  auto depth = std::make_shared<DepthImage>(DepthImage{camera.width(), camera.height(), {}});
   depth->mm.assign(array.data, array.data + static_cast<std::size_t>(depth->width) * depth->height);
   return depth;
 }

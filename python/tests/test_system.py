@@ -364,6 +364,16 @@ def test_a_camera_with_a_depth_sensor():
     assert len(poses) == n and poses[-1].health == "good"
     with pytest.raises(ValueError, match="depth: a NumPy array of uint16"):
         fbvins.System(None, own).push_images(0, None, depth=np.zeros((480, 752)))
+    small = fbvins.Camera(320, 240, 200, 200, 159.5, 119.5)
+    T_BD = own.T_BC0 @ np.array([[1, 0, 0, 0.02], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    elsewhere = fbvins.Rig(own.left, T_BC0=own.T_BC0, depth=fbvins.DepthSensor(camera=small, T_BD=T_BD))
+    assert sensor.camera is None and sensor.T_BD is None
+    assert elsewhere.depth.camera.width == 320 and np.allclose(pickle.loads(pickle.dumps(elsewhere)).depth.T_BD, T_BD)
+    fbvins.System(None, elsewhere).push_images(0, None, depth=np.zeros((240, 320), np.uint16))
+    with pytest.raises(ValueError, match="depth: a NumPy array of uint16"):
+        fbvins.System(None, elsewhere).push_images(0, None, depth=np.zeros((480, 752), np.uint16))
+    with pytest.raises(ValueError, match="camera and T_BD go together"):
+        fbvins.DepthSensor(camera=small)
     with pytest.raises(ValueError, match="the rig has no depth sensor"):
         fbvins.System(None, fbvins.Rig(own.left, T_BC0=own.T_BC0)).push_images(0, None, depth=np.zeros((480, 752), np.uint16))
     with pytest.raises(ValueError, match="goes with one camera"):

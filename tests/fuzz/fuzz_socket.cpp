@@ -41,6 +41,9 @@ void check(const SocketHello& hello) {
     const std::size_t at = layout.offset_bytes[static_cast<std::size_t>(i)];
     require(at >= layout.image_bytes() && at + layout.image_bytes() <= layout.slot_bytes);
   }
+  if (layout.depth_offset_bytes > 0)
+    require(layout.cameras == 1 && layout.depth_offset_bytes >= layout.image_bytes() && layout.depth_values() > 0 &&
+            layout.depth_offset_bytes + 2 * layout.depth_values() <= layout.slot_bytes);
   if (hello.rig) require(parse_socket_rig(*hello.rig, layout.width_px, layout.height_px).ok());
 }
 
@@ -72,11 +75,17 @@ std::vector<std::string> socket_seeds() {
   three.minor = 2, three.cameras = 3, three.slot_bytes = 12288, three.more_offset_bytes[0] = 8192;
   three.more[0] = three.rig.left;
   three.more[0].T_BC[7] = 0.25;
+  FbvinsSocketHello depth = hello;
+  depth.flags |= FBVINS_SOCKET_HAS_CAMERAS | FBVINS_SOCKET_HAS_DEPTH | FBVINS_SOCKET_HAS_DEPTH_CAMERA;
+  depth.minor = 6, depth.cameras = 1, depth.slot_bytes = 12288, depth.depth_offset_bytes = 4096;
+  depth.depth = {0.003, 0.2, 8, 0.005};
+  depth.depth_width_px = 64, depth.depth_height_px = 48, depth.depth_camera = depth.rig.left;
   FbvinsSocketImu imu{{}, 3, 0, {}};
   for (int i = 0; i < 3; ++i) imu.readings[i] = {100 + i, {0.1, 0.2, 0.3}, {0, 0, 9.81}};
   return {
       bytes_of(FBVINS_SOCKET_HELLO, hello),
       bytes_of(FBVINS_SOCKET_HELLO, three),
+      bytes_of(FBVINS_SOCKET_HELLO, depth),
       bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
       bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT, {}}),
       bytes_of(FBVINS_SOCKET_POSITION, FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),

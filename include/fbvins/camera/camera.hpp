@@ -121,12 +121,13 @@ struct MountedCamera {
   Pose<B, C0> T_BC;  ///< C0 is this camera's own frame
 };
 
-/// A sensor of depth images that are registered to the left camera, pixel by pixel. Its noise grows with the square of the
-/// distance, as that of every sensor that triangulates: a constant noise of the inverse depth.
+/// A sensor of depth images, which are registered to the left camera, pixel by pixel, or have a lens and a pose of their own. Its
+/// noise grows with the square of the distance, as that of every sensor that triangulates: a constant noise of the inverse depth.
 struct DepthSensor {
   double noise_at_1m_m = 0.003;  ///< standard deviation at a distance of one metre
   double nearest_m = 0.2, farthest_m = 8;
-  double scale_sigma = 0.005;  ///< relative standard deviation of what all its distances are wrong by together
+  double scale_sigma = 0.005;             ///< relative standard deviation of what all its distances are wrong by together
+  std::optional<MountedCamera> own = {};  ///< in whose pixels and along whose z it measures; without it the left camera's
 };
 
 /// A depth is observed like a disparity: in a right camera so far away that what it sees of the pixel itself counts nothing.
@@ -157,6 +158,8 @@ struct StereoRig {
     return {time_offset_s + own.time_offset_s, line_delay_s + own.line_delay_s};
   }
   MountedCamera mounted(int i) const { return {camera(i), T_BC(i)}; }
+  /// Whose pixels those of the depth images are.
+  const Camera& depth_camera() const { return depth && depth->own ? depth->own->camera : left; }
   Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
 };
 
@@ -182,7 +185,7 @@ inline StereoRig with_cameras(StereoRig rig, std::vector<MountedCamera> cameras)
   return rig;
 }
 
-/// The rig with its left camera and a depth sensor that is registered to it.
+/// The rig with its left camera and a depth sensor.
 inline StereoRig with_depth(StereoRig rig, const DepthSensor& sensor) {
   rig.depth = sensor;
   return with_cameras(rig, {rig.mounted(0)});

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inverse depth at a pixel of a depth image. One instance may be used by any thread.
+// The inverse depth at a pixel of the left camera, by the depth image of a sensor that is registered to it or of one that lies
+// elsewhere. One instance may be used by any thread.
 //
-//   DepthReader reader(*rig.depth, rig.left);
+//   DepthReader reader(rig);
 //   if (auto depth = reader.at(*frame.depth, px)) use(depth->value, depth->sigma);
 #pragma once
 
@@ -20,19 +21,23 @@ struct MeasuredInverseDepth {
 
 class DepthReader {
  public:
-  DepthReader(const DepthSensor& sensor, const Camera& left) : sensor_(sensor), width_(left.width()), height_(left.height()) {}
+  /// Of a rig with a depth sensor.
+  explicit DepthReader(const StereoRig& rig);
 
-  /// Whether a depth image is registered to the camera: of its size.
+  /// Whether a depth image is one of the sensor's: of its size.
   bool is_usable(const DepthImage* image) const {
     return image != nullptr && image->width == width_ && image->height == height_ &&
            image->mm.size() == static_cast<std::size_t>(width_) * height_;
   }
   /// Of the plane through the depths around the pixel: on a plane the inverse depth is linear in the (undistorted) image. Nothing
-  /// in a hole, out of range, at the edge of the image, and where an edge of depth passes: there the sensor lies.
+  /// in a hole, out of range, at the edge of the image, and where an edge of depth passes: there the sensor lies. Of a sensor
+  /// that lies elsewhere nothing, either, where something nearer hides from it what the camera sees.
   std::optional<MeasuredInverseDepth> at(const DepthImage& image, const Vec2& px) const;
 
  private:
   DepthSensor sensor_;
+  Camera left_;
+  Pose<C0, C0> T_EC_;  ///< from the left camera to the frame E of a sensor that lies elsewhere
   int width_, height_;
 };
 

@@ -17,7 +17,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 5,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 6,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -77,7 +77,7 @@ typedef struct FbvinsSocketTimes {
   double line_delay_s;   ///< of a rolling shutter, from row to row; the stamp is the middle row's. 0: a global shutter
 } FbvinsSocketTimes;
 
-/// A depth sensor whose images are registered to the camera (docs/depth.md).
+/// A depth sensor (docs/depth.md).
 typedef struct FbvinsSocketDepth {
   double noise_at_1m_m;  ///< standard deviation at a distance of one metre; it grows with the square of the distance
   double nearest_m, farthest_m;
@@ -92,13 +92,14 @@ enum {
   FBVINS_SOCKET_HAS_CAMERAS = 2,  ///< since version 1.2: the fields from `cameras` on are filled; two cameras without it
   FBVINS_SOCKET_HAS_DEPTH =
       4,  ///< since version 1.3: one camera, with a depth sensor; those from `depth_offset_bytes` on are filled
-  FBVINS_SOCKET_HAS_TIMES = 8  ///< since version 1.4: `times` is filled
+  FBVINS_SOCKET_HAS_TIMES = 8,         ///< since version 1.4: `times` is filled
+  FBVINS_SOCKET_HAS_DEPTH_CAMERA = 16  ///< since version 1.6: with FBVINS_SOCKET_HAS_DEPTH, those from `depth_width_px` on are
 };
 
 /// The first message, with one file descriptor: a memfd of at least slots * slot_bytes, sealed with F_SEAL_SHRINK.
 /// Slot k begins at k * slot_bytes: the left image, row after row, at right_offset_bytes the right one, and at
 /// more_offset_bytes[i] that of camera 2 + i. All cameras have images of one size. At depth_offset_bytes, an even number, the
-/// depth image: 16 bits a pixel, millimetres along z of the camera, 0 where nothing was measured.
+/// depth image: 16 bits a pixel, millimetres along z of the camera whose pixels they are, 0 where nothing was measured.
 typedef struct FbvinsSocketHello {
   FbvinsSocketHeader header;
   char magic[8];
@@ -122,6 +123,10 @@ typedef struct FbvinsSocketHello {
   FbvinsSocketDepth depth;  ///< of the rig
   // Since version 1.4, with FBVINS_SOCKET_HAS_TIMES; else 0 or left out:
   FbvinsSocketTimes times[FBVINS_SOCKET_MOST_CAMERAS];  ///< of the rig's cameras 0, 1 ...
+  // Since version 1.6, with FBVINS_SOCKET_HAS_DEPTH_CAMERA, of depth images that are not registered to the camera; else 0 or
+  // left out:
+  uint32_t depth_width_px, depth_height_px;
+  FbvinsSocketCamera depth_camera;  ///< of the rig: the depth sensor's own lens and pose
 } FbvinsSocketHello;
 
 typedef struct FbvinsSocketReading {

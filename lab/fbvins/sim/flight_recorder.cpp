@@ -31,17 +31,25 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
       world_(std::move(world)),
       bake_(bake_light(*world_, options.world.ambient)) {
   for (int i = 0; i < rig.camera_count(); ++i) {
-    const auto& [camera, T_BC] = rig.mounted(i);
     const double gain = i == 1 ? options.camera.right_gain : 1.0;
     const auto seed = static_cast<std::uint64_t>(options.seed) * 2 + (i < 2 ? 0 : 1'000'000) + static_cast<std::uint64_t>(i);
-    eyes_.push_back({{}, ImageSensor(options.camera, camera, gain, seed), {}, camera.height()});
-    if (camera.sees_backwards())
-      for (const auto& [face, T_BF] : faces_of({camera, T_BC}))
-        eyes_.back().faces.push_back({Renderer(face, *world_, face.mask().get()), T_BF, face.mask()});
-    else eyes_.back().faces.push_back({Renderer(camera, *world_), T_BC, nullptr});
-    if (options.camera.legs > 0) eyes_.back().legs.emplace(camera.width(), camera.height(), options.camera.legs, i);
+    eyes_.push_back(make_eye(rig.mounted(i), gain, seed));
+    const int width = rig.camera(i).width(), height = rig.camera(i).height();
+    if (options.camera.legs > 0) eyes_.back().legs.emplace(width, height, options.camera.legs, i);
+    if (options.camera.propellers > 0) eyes_.back().propellers.emplace(width, height, options.camera.propellers, i);
   }
-  if (rig.depth) depth_.emplace(options.depth, rig.left, static_cast<std::uint64_t>(options.seed));
+  if (rig.depth) depth_.emplace(options.depth, rig.depth_camera(), static_cast<std::uint64_t>(options.seed));
+  if (rig.depth && rig.depth->own) depth_eye_ = make_eye(*rig.depth->own, 1, 0);
+}
+
+FlightRecorder::Eye FlightRecorder::make_eye(const MountedCamera& mounted, double gain, std::uint64_t seed) const {
+  const auto& [camera, T_BC] = mounted;
+  Eye eye{{}, ImageSensor(options_.camera, camera, gain, seed), {}, {}, camera.height()};
+  if (camera.sees_backwards())
+    for (const auto& [face, T_BF] : faces_of(mounted))
+      eye.faces.push_back({Renderer(face, *world_, face.mask().get()), T_BF, face.mask()});
+  else eye.faces.push_back({Renderer(camera, *world_), T_BC, nullptr});
+  return eye;
 }
 
 /// Sums the radiance over an exposure that is centred at t.
@@ -54,6 +62,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
   eye.faces.front().renderer.radiance(eye.radiance);
   if (eye.faces.front().shown != nullptr) join_faces(eye);
   if (eye.legs) eye.legs->draw(eye.radiance);
+  if (eye.propellers) eye.propellers->draw(eye.radiance, t_s, exposure_s, options_.camera.line_delay_us * 1e-6);
 }
 
 /// Each pixel from a face that shows it; black where none does.
@@ -108,14 +117,15 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
   rendered.exposure_s = eyes_.front().sensor.exposure_s();
   std::vector<std::future<Image>> others;
   for (std::size_t i = 1; i < eyes_.size(); ++i)
-    others.push_back(std::async(std::launch::async,
-                                [this, i, t_s, frame] { return render_eye(eyes_[i], t_s + offset(i, t_s).seconds(), frame); }));
+    others.push_back(
+        std::async(std::launch::async, [this, i, t_s, frame] { return render_eye(eyes_[i], exposed_s(i, t_s), frame); }));
   rendered.frame.left = std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame));
   if (with_depth) eyes_.front().faces.front().renderer.depth(rendered.depth_left_m);
   if (depth_) {
     std::vector<float> exact_m;
-    gather(eyes_.front(), t_s, 0, 1);
-    eyes_.front().faces.front().renderer.depth(exact_m);
+    Eye& eye = depth_eye_ ? *depth_eye_ : eyes_.front();
+    gather(eye, t_s, 0, 1);
+    eye.faces.front().renderer.depth(exact_m);
     rendered.frame.depth = std::make_shared<const DepthImage>(depth_->measure(exact_m, frame));
   }
   for (std::size_t i = 1; i < eyes_.size(); ++i)
@@ -133,6 +143,11 @@ Duration FlightRecorder::offset(std::size_t camera, double t_s) const {
   const double before_s = 1e-3 * options_.camera.untriggered_ms + 1e-6 * options_.camera.untriggered_drift_us_per_s * t_s;
   const double offset_s = -std::fmod(static_cast<double>(camera) * before_s, 1 / options_.image_rate_hz);
   return Duration::from_seconds(std::max(offset_s, -t_s));
+}
+
+/// When it takes its image of the frame at t.
+double FlightRecorder::exposed_s(std::size_t camera, double t_s) const {
+  return t_s + offset(camera, t_s).seconds() + 1e-3 * static_cast<double>(camera) * options_.camera.later_ms;
 }
 
 Duration FlightRecorder::right_jitter(std::int64_t frame) const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fbvins/sim/legs.hpp"
+#include "fbvins/sim/propellers.hpp"
 #include "fbvins/sim/renderer.hpp"
 #include "fbvins/sim/simulation.hpp"
 
@@ -38,17 +39,20 @@ class FlightRecorder {
     std::vector<Face> faces;
     ImageSensor sensor;
     std::optional<Legs> legs;
+    std::optional<Propellers> propellers;
     int height_px;
     std::vector<float> radiance = {};
     MixedLight light = {};
     std::vector<Facet> facets = {};
     bool settled = false;
   };
+  Eye make_eye(const MountedCamera& mounted, double gain, std::uint64_t seed) const;
   void gather(Eye& eye, double t_s, double exposure_s, int samples);
   static void join_faces(Eye& eye);
   void add_instant(Eye& eye, double t_s, int sample, int samples);
   Image render_eye(Eye& eye, double t_s, std::int64_t frame);
   Duration offset(std::size_t camera, double t_s) const;
+  double exposed_s(std::size_t camera, double t_s) const;
 
   SimulationOptions options_;
   BodyMotion motion_;
@@ -57,6 +61,7 @@ class FlightRecorder {
   LightBake bake_;
   std::vector<Eye> eyes_;  // of the rig's cameras, in order
   std::optional<DepthModel> depth_;
+  std::optional<Eye> depth_eye_;  // of a depth sensor that lies elsewhere
 };
 
 }  // namespace fbvins

@@ -90,6 +90,7 @@ constexpr Preset kPresets[] = {
     {"fisheye", [](SimulationOptions& o) { o.rig = "fisheye"; }},
     {"back-to-back", [](SimulationOptions& o) { o.rig = "back-to-back"; }},
     {"legs", [](SimulationOptions& o) { o.camera.legs = 3; }},
+    {"propellers", [](SimulationOptions& o) { o.camera.propellers = 2; }},
 };
 
 }  // namespace

@@ -75,6 +75,12 @@ Camera fisheye() {
   return camera;
 }
 
+/// As far to the right of the left camera, and slightly turned.
+MountedCamera depth_camera(const Pose<B, C0>& T_BC0, double apart_m) {
+  const Pose<C0, C0> T_CD(so3_exp(Vec3(0.012, -0.02, 0.008)), Vec3(apart_m, 0, 0));
+  return {Camera(PinholeRadtan{382, 382, 318.4, 241.7, 0, 0, 0, 0}, 640, 480), T_BC0 * T_CD};
+}
+
 void put_lens(StereoRig& rig, const Camera& camera) {
   rig.left = camera;
   if (rig.has_right()) rig.right = camera;
@@ -114,9 +120,15 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
   }
   if (o.rig == "quad") add_turned(rig, 180, {0, 1});
   if (o.rig == "sides") add_turned(rig, 90, {0}), add_turned(rig, -90, {0});
-  if (o.rig == "rgbd")
+  if (o.rig == "rgbd") {
     rig = with_depth(rig,
                      {.noise_at_1m_m = o.depth.noise_at_1m_m, .nearest_m = o.depth.nearest_m, .farthest_m = o.depth.farthest_m});
+    if (o.depth.apart_m > 0) rig.depth->own = depth_camera(rig.T_BC0, o.depth.apart_m);
+  }
+  for (int i = 1; o.camera.later_ms > 0 && i < rig.camera_count(); ++i) {
+    Camera& camera = i == 1 ? rig.right : rig.more[static_cast<std::size_t>(i - 2)].camera;
+    camera.set_own_times({.time_offset_s = 1e-3 * i * o.camera.later_ms});
+  }
   rig.image_rate_hz = o.image_rate_hz;
   rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
   rig.line_delay_s = o.camera.line_delay_us * 1e-6;

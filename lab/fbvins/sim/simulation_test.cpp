@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <set>
 
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 
@@ -108,6 +109,43 @@ TEST(Simulation, ScenariosHaveTheirEffects) {
   ASSERT_TRUE(dropped);
   EXPECT_LT(dropped->frames.size(), 70u);
   EXPECT_GT(dropped->frames.size(), 40u);
+}
+
+TEST(Simulation, CamerasMayTakeTheirImagesLaterThanTheirStampsSay) {
+  const auto frame = [](double later_ms) {
+    SimulationOptions options = short_flight("normal");
+    options.camera.later_ms = later_ms;
+    auto simulation = prepare_simulation(options);
+    EXPECT_TRUE(simulation);
+    EXPECT_NEAR(simulation->rig.times(1).time_offset_s, 1e-3 * later_ms, 1e-12);
+    return render_frame(*simulation, 4).frame;
+  };
+  const StereoFrame on_time = frame(0), later = frame(8);
+  EXPECT_EQ(later.t, on_time.t);
+  EXPECT_TRUE(later.offsets.all_zero()) << "offsets are of stamps";
+  EXPECT_TRUE(std::equal(later.left->row(0), later.left->row(480), on_time.left->row(0)));
+  EXPECT_FALSE(std::equal(later.right->row(0), later.right->row(480), on_time.right->row(0)));
+}
+
+TEST(Simulation, ADepthSensorThatLiesElsewhereMeasuresTheSameRoom) {
+  SimulationOptions options = short_flight("rgbd");
+  options.depth.apart_m = 0.06;
+  options.depth.noise_at_1m_m = 1e-4, options.depth.hole_share = 0, options.depth.edge_px = 0, options.depth.baseline_m = 0;
+  auto simulation = prepare_simulation(options);
+  ASSERT_TRUE(simulation);
+  const RenderedFrame rendered = render_frame(*simulation, 4, true);
+  const DepthReader reader(simulation->rig);
+  ASSERT_TRUE(reader.is_usable(rendered.frame.depth.get()));
+  int measured = 0, right = 0;
+  for (int y = 10; y < 480; y += 20)
+    for (int x = 10; x < 752; x += 20) {
+      const auto depth = reader.at(*rendered.frame.depth, Vec2(x, y));
+      if (!depth) continue;
+      const double truth_m = rendered.depth_left_m[static_cast<std::size_t>(y * 752 + x)];
+      ++measured, right += std::abs(1 / depth->value - truth_m) < 0.01 * truth_m;
+    }
+  EXPECT_GT(measured, 300) << "of 912";
+  EXPECT_GT(right, 0.97 * measured);
 }
 
 TEST(Simulation, WrongOptionsAreRefusedWithASentence) {

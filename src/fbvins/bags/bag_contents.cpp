@@ -217,4 +217,11 @@ std::string not_registered(const BagContents& contents, const ChosenTopics& topi
   return "";
 }
 
+std::optional<MountedCamera> depth_camera_of(const BagContents& contents, const ChosenTopics& topics, const StereoRig& rig) {
+  const BagCamera *camera = camera_for(contents, topics.cameras.front()), *depth = camera_for(contents, topics.depth);
+  const auto between = camera && depth ? find_transform(contents.transforms, camera->frame, depth->frame) : std::nullopt;
+  if (!between) return std::nullopt;
+  return MountedCamera{depth->camera, rig.T_BC0 * between->cast_frames<C0, C0>()};
+}
+
 }  // namespace fbvins

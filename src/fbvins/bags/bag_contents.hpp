@@ -79,5 +79,7 @@ Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics
 std::vector<std::string> calibrated_cameras(const BagContents& contents, const ChosenTopics& topics);
 /// Why the depth images do not lie on those of the first camera, pixel by pixel, as far as the bag tells; empty: they do.
 std::string not_registered(const BagContents& contents, const ChosenTopics& topics);
+/// The depth images' own lens and pose, by camera_info and transforms; nullopt where the bag has them not.
+std::optional<MountedCamera> depth_camera_of(const BagContents& contents, const ChosenTopics& topics, const StereoRig& rig);
 
 }  // namespace fbvins

@@ -89,7 +89,7 @@ Result<StereoRig> load_euroc(const std::string& folder) {
   if (!imu) return imu.error();
   const Result<StereoRig> rig = join_euroc(cameras, *imu, folder);
   if (!rig || cameras.size() > 1 || !(*files)->exists(roots[0] + "depth0/sensor.yaml")) return rig;
-  const auto depth = parse("depth0/sensor.yaml", parse_depth_sensor);
+  const auto depth = parse("depth0/sensor.yaml", [&](YamlReader yaml) { return parse_depth_sensor(std::move(yaml), imu->T_BS); });
   if (!depth) return depth.error();
   return with_depth(*rig, *depth);
 }

@@ -14,6 +14,7 @@
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/camera/camera_times.hpp"
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/dataset_description.hpp"
@@ -165,20 +166,24 @@ class BagRecording {
     return {};
   }
 
-  /// Depth images that do not lie on the camera's are an error only where they were asked for.
+  /// Depth images that do not lie on the camera's are used with the pose that calibration or bag have of the sensor; without one
+  /// they are an error only where they were asked for.
   Result<void> use_depths() {
     if (topics_.depth.empty()) return {};
-    if (const std::string why = not_registered(contents_, topics_); !why.empty()) {
-      const std::string sentence =
-          fmt::format("the depth images on {} are not registered to {}: {}", topics_.depth, topics_.cameras.front(), why);
+    DepthSensor sensor = rig_->depth.value_or(DepthSensor{});
+    const std::string why = sensor.own ? "" : not_registered(contents_, topics_);
+    if (!why.empty()) sensor.own = depth_camera_of(contents_, topics_, out_.rig);
+    if (!why.empty() && !sensor.own) {
+      const std::string sentence = fmt::format("the depth images on {} are not registered to {}, and their pose is not known: {}",
+                                               topics_.depth, topics_.cameras.front(), why);
       if (options_.dataset.camera == "depth" || named_) return Error{ErrorCode::unsupported, sentence};
       out_.info.warnings.push_back(sentence + "; they are not used");
       topics_.depth.clear();
       return {};
     }
     if (!rig_->depth) out_.info.warnings.emplace_back("there are no figures of the depth sensor: defaults are used");
-    out_.rig = with_depth(out_.rig, rig_->depth.value_or(DepthSensor{}));
-    return {};
+    out_.rig = with_depth(out_.rig, sensor);
+    return check_rig(out_.rig, topics_.depth);
   }
 
   std::vector<ImageRow> rows_of(const std::string& name, CameraInfo& info) {
@@ -251,7 +256,7 @@ class BagRecording {
     for (const std::string& topic : topics_.cameras)
       cameras.push_back(sensor(topic, out_.rig.camera(static_cast<int>(cameras.size()))));
     std::optional<BagLoader::Sensor> depth;
-    if (!topics_.depth.empty()) depth = sensor(topics_.depth, out_.rig.left);
+    if (!topics_.depth.empty()) depth = sensor(topics_.depth, out_.rig.depth_camera());
     auto loader = std::make_unique<BagLoader>(std::move(bag), path_, std::move(cameras), std::move(depth));
     if (const int bits = loader->find_used_bits(out_.frames); bits < 16)
       out_.info.warnings.push_back(

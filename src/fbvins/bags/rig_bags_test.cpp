@@ -50,8 +50,10 @@ class RigBags : public ::testing::Test {
       for (int k = 2; k < rig.camera_count(); ++k) frame.more.push_back(i == 4 && k == 2 ? nullptr : shade(i + 20 * k));
       frame.offsets.set(2, Duration{1'000'000});
       if (rig.depth) {
-        auto depth = std::make_shared<DepthImage>(DepthImage{kWidth, kHeight, {}});
-        depth->mm.assign(std::size_t{kWidth} * kHeight, static_cast<std::uint16_t>(2000 + i));
+        const Camera& seen_by = rig.depth_camera();
+        auto depth = std::make_shared<DepthImage>(DepthImage{seen_by.width(), seen_by.height(), {}});
+        depth->mm.assign(static_cast<std::size_t>(depth->width) * static_cast<std::size_t>(depth->height),
+                         static_cast<std::uint16_t>(2000 + i));
         frame.depth = std::move(depth);
       }
       ASSERT_TRUE(bag->add(frame));
@@ -133,6 +135,33 @@ TEST_F(RigBags, DepthImagesAreOfTheCamera) {
   EXPECT_FALSE(open({.dataset = {.camera = "left"}})->rig().depth);
 }
 
+/// By the whole calibration in the bag, and by camera_info and /tf_static where other topics than its own are asked for.
+TEST_F(RigBags, ADepthSensorThatLiesElsewhereHasItsOwnLensAndPose) {
+  const StereoRig one = rig_of_cameras(1);
+  const MountedCamera own{Camera(PinholeRadtan{50, 51, 20, 16, 0.1, 0, 0, 0}, 40, 32),
+                          one.T_BC0 * Pose<C0, C0>(so3_exp({0.01, 0.02, 0.03}), Vec3(0.015, 0.002, 0.001))};
+  write(with_depth(one, {.noise_at_1m_m = 0.007, .own = own}));
+  const auto expect_own = [&](const Dataset& data, double tolerance) {
+    ASSERT_TRUE(data.rig().depth && data.rig().depth->own);
+    const MountedCamera& read = *data.rig().depth->own;
+    EXPECT_EQ(read.camera.width(), 40);
+    EXPECT_EQ(read.camera.intrinsics(), own.camera.intrinsics());
+    EXPECT_LE((read.T_BC.p - own.T_BC.p).norm(), tolerance);
+    EXPECT_LE((read.T_BC.R() - own.T_BC.R()).norm(), tolerance);
+  };
+  const auto data = open();
+  ASSERT_TRUE(data);
+  expect_own(*data, 0);
+  const std::vector<StereoFrame> read = frames(*data);
+  ASSERT_TRUE(read[6].depth);
+  EXPECT_EQ(read[6].depth->row(31)[39], 2006);
+  const StereoRig calibrated = one;  // of the camera alone: that of the depth sensor is the bag's
+  const auto by_transforms = open({.dataset = {.rig = calibrated}});
+  ASSERT_TRUE(by_transforms);
+  expect_own(*by_transforms, 1e-12);
+  EXPECT_EQ(by_transforms->rig().depth->noise_at_1m_m, DepthSensor{}.noise_at_1m_m);
+}
+
 TEST_F(RigBags, WithoutDepthImagesTheyCannotBeAskedFor) {
   write(rig_of_cameras(2));
   EXPECT_NE(open_recording(path(), {.dataset = {.camera = "depth"}}).error().message.find("there are no depth images"),
@@ -200,6 +229,12 @@ TEST(RigTopics, DepthImagesOfAnotherCameraAreNotRegistered) {
   EXPECT_EQ(not_registered(contents, topics), "they are in the frame 'infra', 15.0 mm from the camera's");
   contents.cameras["/depth/camera_info"].camera = Camera(PinholeRadtan{70, 70, 40, 30}, kWidth, kHeight);
   EXPECT_NE(not_registered(contents, topics).find("80 x 60 pixels and 70.0 px of focal length"), std::string::npos);
+  const auto own = depth_camera_of(contents, topics, rig_of_cameras(1));
+  ASSERT_TRUE(own);
+  EXPECT_EQ(own->camera.focal_px(), 70);
+  EXPECT_LT((own->T_BC.p - rig_of_cameras(1).T_BC0 * Vec3(0.015, 0, 0)).norm(), 1e-12);
+  contents.transforms.clear();
+  EXPECT_FALSE(depth_camera_of(contents, topics, rig_of_cameras(1))) << "nobody says where it is";
 }
 
 TEST(DepthImages, MillimetresAndMetresAreRead) {

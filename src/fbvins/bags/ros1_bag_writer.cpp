@@ -67,8 +67,9 @@ enum Number : std::uint32_t {
   kRig,
   kTruth,
   kOdometry,
-  kFurther,          ///< image and camera_info of each camera from number 2 on
-  kDepth = kFurther  ///< of a rig with one camera
+  kFurther,           ///< image and camera_info of each camera from number 2 on
+  kDepth = kFurther,  ///< of a rig with one camera
+  kDepthInfo          ///< of a depth sensor with a lens of its own
 };
 
 std::uint32_t image_number(int camera) {
@@ -94,6 +95,7 @@ std::vector<Topic> topics(const StereoRig& rig) {
                             {std::string(kBagOdometryTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
                              definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})}};
   if (rig.depth) out.push_back({std::string(kBagDepthTopic), "sensor_msgs/Image", kImage, image});
+  if (rig.depth && rig.depth->own) out.push_back({"/depth0/camera_info", "sensor_msgs/CameraInfo", kCamera, camera});
   for (int i = 2; i < rig.camera_count(); ++i) {
     out.push_back({bag_camera_topic(i), "sensor_msgs/Image", kImage, image});
     out.push_back({fmt::format("/cam{}/camera_info", i), "sensor_msgs/CameraInfo", kCamera, camera});
@@ -177,8 +179,8 @@ std::string image_message(Time t, std::string_view frame, const Image& image) {
   return out;
 }
 
-std::string depth_message(Time t, const DepthImage& depth) {
-  std::string out = image_header(t, kLeftFrame, depth.width, depth.height, "16UC1", 2);
+std::string depth_message(Time t, std::string_view frame, const DepthImage& depth) {
+  std::string out = image_header(t, frame, depth.width, depth.height, "16UC1", 2);
   return out.append(reinterpret_cast<const char*>(depth.mm.data()), 2 * depth.mm.size());
 }
 
@@ -202,14 +204,16 @@ std::string camera_message(Time t, std::string_view frame, const Camera& camera)
 
 std::string transforms_message(Time t, const StereoRig& rig) {
   std::string out;
-  append_le(out, static_cast<std::uint32_t>(rig.camera_count()));
-  for (int i = 0; i < rig.camera_count(); ++i) {
-    const Pose<B, C0> T_BC = rig.T_BC(i);
+  const bool depth_elsewhere = rig.depth && rig.depth->own;
+  append_le(out, static_cast<std::uint32_t>(rig.camera_count() + depth_elsewhere));
+  const auto add = [&](const std::string& frame, const Pose<B, C0>& T_BC) {
     add_header(out, t, kBodyFrame);
-    add_text(out, camera_frame(i));
+    add_text(out, frame);
     add_doubles(out, T_BC.p.data(), 3);
     add_quaternion(out, T_BC.q);
-  }
+  };
+  for (int i = 0; i < rig.camera_count(); ++i) add(camera_frame(i), rig.T_BC(i));
+  if (depth_elsewhere) add(std::string(kDepthFrame), rig.depth->own->T_BC);
   return out;
 }
 
@@ -236,9 +240,11 @@ struct ChunkInfo {
 }  // namespace
 
 struct Ros1BagWriter::State {
-  State(AtomicFile opened, const StereoRig& rig) : file(std::move(opened)), all(topics(rig)) {}
+  State(AtomicFile opened, const StereoRig& rig)
+      : file(std::move(opened)), depth_frame(rig.depth && rig.depth->own ? kDepthFrame : kLeftFrame), all(topics(rig)) {}
 
   AtomicFile file;
+  std::string_view depth_frame;
   std::string chunk;
   ChunkInfo info;
   std::vector<ChunkInfo> chunks;
@@ -344,6 +350,7 @@ Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const Stere
   std::vector<std::pair<std::uint32_t, std::string>> messages;
   for (int i = 0; i < rig.camera_count(); ++i)
     messages.emplace_back(info_number(i), camera_message(start, camera_frame(i), rig.camera(i)));
+  if (rig.depth && rig.depth->own) messages.emplace_back(kDepthInfo, camera_message(start, kDepthFrame, rig.depth->own->camera));
   messages.emplace_back(kTransforms, transforms_message(start, rig));
   messages.emplace_back(kRig, text_message(rig_to_yaml(rig)));
   for (const auto& [number, message] : messages)
@@ -366,7 +373,7 @@ Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
     if (Result<void> done = state_->add(image_number(i), frame.t, message); !done) return done;
   }
   if (!frame.depth) return {};
-  return state_->add(kDepth, frame.t, depth_message(frame.t, *frame.depth));
+  return state_->add(kDepth, frame.t, depth_message(frame.t, state_->depth_frame, *frame.depth));
 }
 
 Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) {

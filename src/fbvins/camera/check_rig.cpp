@@ -93,6 +93,13 @@ Result<void> check_depth(const StereoRig& rig, std::string_view origin) {
   if (!positive(sensor.noise_at_1m_m) || !positive(sensor.nearest_m) || !positive(sensor.scale_sigma) ||
       !(sensor.farthest_m > sensor.nearest_m) || !std::isfinite(sensor.farthest_m))
     return malformed(origin, "the depth sensor's noise, range or scale is not positive, or its range is empty");
+  if (!sensor.own) return {};
+  if (Result<void> good = check_camera(sensor.own->camera, "depth", origin); !good) return good;
+  if (!is_transform(sensor.own->T_BC)) return malformed(origin, "the pose of the depth sensor is none");
+  constexpr double kFarthest_m = 1;
+  const double apart_m = (sensor.own->T_BC.p - rig.T_BC0.p).norm();
+  if (!(apart_m < kFarthest_m))
+    return malformed(origin, fmt::format("the depth sensor is {:.3g} m from the camera, more than {} m", apart_m, kFarthest_m));
   return {};
 }
 

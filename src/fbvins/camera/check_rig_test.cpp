@@ -76,6 +76,11 @@ TEST(CheckRig, RefusesWithASentence) {
       {[](StereoRig& r) { r = with_depth(r, {.noise_at_1m_m = 0}); }, "depth sensor's noise"},
       {[&](StereoRig& r) { r = with_depth(r, {.farthest_m = nan}); }, "depth sensor's noise"},
       {[](StereoRig& r) { r = with_depth(r, {.nearest_m = 2, .farthest_m = 1}); }, "its range is empty"},
+      {[](StereoRig& r) { r = with_depth(r, {.own = MountedCamera{}}); }, "the depth camera has 0 x 0 pixels"},
+      {[](StereoRig& r) {
+         r = with_depth(r, {.own = MountedCamera{r.left, {Quat::Identity(), Vec3(3, 0, 0)}}});
+       },
+       "m from the camera, more than 1 m"},
   };
   for (const Broken& broken : all) {
     StereoRig rig = good_rig();

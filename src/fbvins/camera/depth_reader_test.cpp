@@ -27,8 +27,14 @@ DepthImage image_of(const std::function<double(double x, double y)>& depth_m) {
   return image;
 }
 
+StereoRig rig() {
+  StereoRig out;
+  out.left = camera();
+  return with_depth(out, {.noise_at_1m_m = kNoise_m, .nearest_m = 0.3, .farthest_m = 6});
+}
+
 const DepthReader& reader() {
-  static const DepthReader reader({.noise_at_1m_m = kNoise_m, .nearest_m = 0.3, .farthest_m = 6}, camera());
+  static const DepthReader reader(rig());
   return reader;
 }
 
@@ -83,6 +89,74 @@ TEST(DepthReader, TakesImagesOfTheCamerasSizeOnly) {
   DepthImage cut = good;
   cut.mm.pop_back();
   EXPECT_FALSE(reader().is_usable(&cut));
+}
+
+/// A sensor of another size, lens and place: 60 mm to the right, turned by a few degrees.
+StereoRig apart() {
+  StereoRig out = rig();
+  out.T_BC0 = {so3_exp(Vec3(0.4, -0.3, 0.2)), Vec3(0.1, 0.2, 0.3)};
+  const Camera own(PinholeRadtan{.fx = 90, .fy = 92, .cx = 49, .cy = 41, .k1 = -0.1, .k2 = 0.02}, 100, 80);
+  out.depth->own = MountedCamera{own, out.T_BC0 * Pose<C0, C0>(so3_exp(Vec3(0.03, -0.05, 0.04)), Vec3(0.06, 0.01, -0.005))};
+  return out;
+}
+
+/// A turned wall and a plate before it: where a ray from `p` meets them first, by how much of `d`.
+double met(const Vec3& p, const Vec3& d) {
+  const Vec3 wall(0.15, 0.05, 0.4);  // wall . X = 1
+  const double plate = (1 - p.z()) / d.z();
+  const Vec3 at = p + plate * d;
+  return at.x() > -0.1 && at.x() < 0.25 && std::abs(at.y()) < 0.2 ? plate : (1 - wall.dot(p)) / wall.dot(d);
+}
+
+DepthImage seen_apart(const StereoRig& rig, const std::function<double(double)>& noisy) {
+  const auto& [own, T_BE] = *rig.depth->own;
+  const Pose<C0, C0> T_CE = rig.T_BC0.inverse() * T_BE;
+  DepthImage image{own.width(), own.height(), {}};
+  for (int y = 0; y < own.height(); ++y)
+    for (int x = 0; x < own.width(); ++x)
+      image.mm.push_back(
+          static_cast<std::uint16_t>(std::lround(1000 * noisy(met(T_CE.p, T_CE.q * own.undistort(Vec2(x, y))->homogeneous())))));
+  return image;
+}
+
+TEST(DepthReader, OfASensorThatLiesElsewhereTheDepthIsAlongTheCamerasOwnZ) {
+  Rng rng(5, 1);
+  const StereoRig rig = apart();
+  const DepthReader reader(rig);
+  const DepthImage exact = seen_apart(rig, [](double z) { return z; });
+  const DepthImage noisy = seen_apart(rig, [&](double z) { return 1 / (1 / z + kNoise_m * rng.normal()); });
+  ASSERT_TRUE(reader.is_usable(&exact));
+  int count = 0, within = 0, on_plate = 0;
+  for (double y = 4.3; y < kHeight - 4; ++y)
+    for (double x = 4.1; x < kWidth - 4; ++x) {
+      const double truth = 1 / met(Vec3::Zero(), camera().undistort(Vec2(x, y))->homogeneous());
+      if (const auto depth = reader.at(exact, Vec2(x, y))) {
+        EXPECT_NEAR(depth->value, truth, 0.004) << x << ' ' << y;
+      }
+      if (const auto depth = reader.at(noisy, Vec2(x, y)))
+        ++count, within += std::abs(depth->value - truth) < depth->sigma, on_plate += truth == 1;
+    }
+  EXPECT_GT(count, 1200) << "of 2240";
+  EXPECT_GT(on_plate, 100);
+  EXPECT_GT(within, 0.9 * count);
+}
+
+TEST(DepthReader, NothingWhereSomethingNearerHidesFromTheSensorWhatTheCameraSees) {
+  StereoRig rig = apart();
+  rig.depth->own->T_BC = rig.T_BC0 * Pose<C0, C0>(Quat::Identity(), Vec3(0.25, 0, 0));
+  const DepthReader reader(rig);
+  const DepthImage image = seen_apart(rig, [](double z) { return z; });
+  const Pose<C0, C0> T_EC = rig.depth->own->T_BC.inverse() * rig.T_BC0;
+  int hidden = 0;
+  for (double y = 14; y < 34; ++y)
+    for (double x = 4; x < kWidth - 4; ++x) {
+      const Vec3 ray = camera().undistort(Vec2(x, y))->homogeneous(), p_C = met(Vec3::Zero(), ray) * ray;
+      const Vec3 from = T_EC.inverse().p, along = p_C - from;
+      if (met(from, along) > 0.99) continue;  // the sensor sees it, too
+      ++hidden;
+      EXPECT_FALSE(reader.at(image, Vec2(x, y))) << x << ' ' << y;
+    }
+  EXPECT_GT(hidden, 100);
 }
 
 }  // namespace depth_reader_test

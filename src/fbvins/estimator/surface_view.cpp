@@ -20,7 +20,7 @@ constexpr double kLeastCosine = 0.2;
 }  // namespace
 
 SurfaceFinder::SurfaceFinder(const StereoRig& rig) : camera_(rig.left) {
-  if (rig.depth) reader_.emplace(*rig.depth, rig.left);
+  if (rig.depth) reader_.emplace(rig);
 }
 
 std::vector<SurfaceFinder::Place> SurfaceFinder::places(const DepthImage& depth, const Pose<B, C0>& T_BC) const {

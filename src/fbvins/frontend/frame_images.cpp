@@ -17,7 +17,7 @@ bool is_usable(const Image* image, const Camera& camera) {
 }
 
 FrameImages::FrameImages(const StereoRig& rig, int levels) : rig_(rig), levels_(levels) {
-  if (rig.depth) reader_.emplace(*rig.depth, rig.left);
+  if (rig.depth) reader_.emplace(rig);
 }
 
 void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {

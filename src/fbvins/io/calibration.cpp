@@ -20,9 +20,16 @@ Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read)
   return sensor;
 }
 
-Result<DepthSensor> parse_depth_sensor(YamlReader yaml) {
-  const DepthSensor sensor = read_depth_sensor(yaml, yaml.root());
+Result<DepthSensor> parse_depth_sensor(YamlReader yaml, const Pose<B, B>& T_BI) {
+  DepthSensor sensor = read_depth_sensor(yaml, yaml.root());
   if (!yaml.ok()) return yaml.error();
+  const auto has = [&](const char* key) { return yaml.has(yaml.root(), key); };
+  if (!has("T_BS") && !has("camera_model") && !has("intrinsics")) return sensor;
+  sensor.own = MountedCamera{read_real_camera(yaml, yaml.root(), "distortion_coefficients", {}), {}};
+  if (!yaml.ok()) return yaml.error();
+  const Result<Pose<B, B>> mounting = parse_euroc_mounting(std::move(yaml));
+  if (!mounting) return mounting.error();
+  sensor.own->T_BC = (T_BI.inverse() * *mounting).cast_frames<B, C0>();
   return sensor;
 }
 

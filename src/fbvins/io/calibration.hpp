@@ -32,8 +32,9 @@ struct ImuSensor {
 
 Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read = {});
 Result<ImuSensor> parse_euroc_imu(YamlReader yaml);
-/// depth0/sensor.yaml of a depth sensor that is registered to cam0 (docs/depth.md).
-Result<DepthSensor> parse_depth_sensor(YamlReader yaml);
+/// depth0/sensor.yaml of a depth sensor: registered to cam0, or with a lens and a pose of its own (docs/depth.md). `T_BI`: the
+/// IMU's, ImuSensor::T_BS.
+Result<DepthSensor> parse_depth_sensor(YamlReader yaml, const Pose<B, B>& T_BI);
 /// Only the T_BS of a sensor.yaml.
 Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml);
 /// The rig of these cameras, one or more, and the IMU; `file` is only for messages. An error where check_rig has one.

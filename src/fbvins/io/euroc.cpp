@@ -119,7 +119,8 @@ class EurocReader {
 
   Result<void> read_depth_sensor() {
     if (!has_depth_) return {};
-    Result<DepthSensor> sensor = parse_yaml(depth("sensor.yaml"), parse_depth_sensor);
+    Result<DepthSensor> sensor =
+        parse_yaml(depth("sensor.yaml"), [&](YamlReader yaml) { return parse_depth_sensor(std::move(yaml), T_BI_); });
     if (!sensor) return sensor.error();
     out_.rig = with_depth(out_.rig, *sensor);
     return check_rig(out_.rig, named(depth("sensor.yaml")));

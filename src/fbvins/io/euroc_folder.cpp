@@ -43,20 +43,22 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
   return text + "0.0, 0.0, 0.0, 1.0]\n";
 }
 
+std::string lens_text(const Camera& camera) {
+  const KalibrCamera c = kalibr_camera(camera);
+  return fmt::format(
+      "resolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
+      camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
+      c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", "));
+}
+
 std::string camera_yaml(const StereoRig& rig, int number, const std::string& origin) {
   const auto& [camera, T_BC] = rig.mounted(number);
   const auto [time_offset_s, line_delay_s] = rig.times(number);
-  const KalibrCamera c = kalibr_camera(camera);
   const bool on_time = time_offset_s == 0 && rig.time_offset_s == 0;  // without the key it is camera 0's
   const std::string offset = on_time ? "" : fmt::format("timeshift_cam_imu: {}\n", time_offset_s);
   const std::string rolling = line_delay_s == 0 ? "" : fmt::format("line_delay_us: {}\n", 1e6 * line_delay_s);
   return fmt::format("sensor_type: camera\ncomment: {}\n\n", origin) + matrix_text(T_BC.q, T_BC.p) +
-         fmt::format(
-             "\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\n"
-             "distortion_coefficients: [{}]\n",
-             rig.image_rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
-             c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", ")) +
-         offset + rolling + mask_text(camera);
+         fmt::format("\nrate_hz: {}\n", rig.image_rate_hz) + lens_text(camera) + offset + rolling + mask_text(camera);
 }
 
 std::string imu_yaml(const ImuNoise& n, const std::string& origin) {
@@ -88,8 +90,10 @@ std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {
 }
 
 std::string depth_yaml(const DepthSensor& sensor, const std::string& origin) {
-  return fmt::format("sensor_type: depth\ncomment: {}, registered to cam0 pixel by pixel, in millimetres\n\n", origin) +
-         depth_sensor_text(sensor, "");
+  const auto& own = sensor.own;
+  return fmt::format("sensor_type: depth\ncomment: {}, {}in millimetres\n\n", origin,
+                     own ? "" : "registered to cam0 pixel by pixel, ") +
+         (own ? matrix_text(own->T_BC.q, own->T_BC.p) + lens_text(own->camera) : "") + depth_sensor_text(sensor, "");
 }
 
 std::string depth_png(const std::vector<float>& depth_m, int width, int height) {

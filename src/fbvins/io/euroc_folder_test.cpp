@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/io/file_source.hpp"
 #include "fbvins/io/png_encode.hpp"
 
 namespace fbvins {
@@ -95,21 +96,22 @@ TEST(EurocFolder, OfFourCamerasTheFirstTwoCanBeUsed) {
     }
 }
 
-std::shared_ptr<const DepthImage> depths(int shift) {
-  auto depth = std::make_shared<DepthImage>(DepthImage{kWidth, kHeight, {}});
-  for (int i = 0; i < kWidth * kHeight; ++i) depth->mm.push_back(static_cast<std::uint16_t>(1000 + 7 * i + shift));
+std::shared_ptr<const DepthImage> depths(int shift, const Camera& camera = small_rig().left) {
+  auto depth = std::make_shared<DepthImage>(DepthImage{camera.width(), camera.height(), {}});
+  for (int i = 0; i < camera.width() * camera.height(); ++i)
+    depth->mm.push_back(static_cast<std::uint16_t>(1000 + 7 * i + shift));
   return depth;
 }
 
 /// Two frames of one camera and a depth sensor; the second has no depth image.
-std::string depth_recording(const std::string& name) {
+std::string depth_recording(const std::string& name, const std::optional<MountedCamera>& own = {}) {
   const std::string folder = empty_folder(name);
-  const StereoRig rig = with_depth(small_rig(), {.noise_at_1m_m = 0.0025, .nearest_m = 0.25, .farthest_m = 5.5});
+  const StereoRig rig = with_depth(small_rig(), {.noise_at_1m_m = 0.0025, .nearest_m = 0.25, .farthest_m = 5.5, .own = own});
   auto recording = EurocFolder::create(folder, rig, "made by hand");
   EXPECT_TRUE(recording.ok());
   std::vector<ImuSample> readings;
   for (int i = 0; i < 30; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
-  EXPECT_TRUE(recording->add({Time{1'020'000'000}, pattern(0), nullptr, {}, depths(0)}, Time{}).ok());
+  EXPECT_TRUE(recording->add({Time{1'020'000'000}, pattern(0), nullptr, {}, depths(0, rig.depth_camera())}, Time{}).ok());
   EXPECT_TRUE(recording->add({Time{1'070'000'000}, pattern(1), nullptr}, Time{}).ok());
   EXPECT_TRUE(recording->finish(readings, {}).ok());
   return folder;
@@ -137,6 +139,34 @@ TEST(EurocFolder, KeepsDepthImages) {
   EXPECT_EQ(frames[0].depth->mm, depths(0)->mm);
   EXPECT_FALSE(frames[1].depth);
   EXPECT_TRUE(frames[1].left);
+}
+
+TEST(EurocFolder, KeepsTheLensAndThePoseOfADepthSensorThatLiesElsewhere) {
+  const MountedCamera own{Camera(PinholeRadtan{30, 31, 20.5, 14.5, -0.125, 0.0625, 0, 0}, 40, 30),
+                          {Quat(0.5, -0.5, 0.5, 0.5), Vec3(0.25, -0.0625, 0.125)}};
+  const std::string folder = depth_recording("euroc_depth_elsewhere", own);
+  const auto data = open_dataset(folder);
+  ASSERT_TRUE(data) << data.error().message;
+  const DepthSensor& sensor = *(*data)->rig().depth;
+  ASSERT_TRUE(sensor.own);
+  EXPECT_EQ(sensor.own->camera.intrinsics(), own.camera.intrinsics());
+  EXPECT_EQ(sensor.own->camera.distortion(), own.camera.distortion());
+  EXPECT_EQ(sensor.own->camera.width(), 40);
+  EXPECT_TRUE(sensor.own->T_BC.p.isApprox(own.T_BC.p, 1e-12));
+  EXPECT_LT(sensor.own->T_BC.q.angularDistance(own.T_BC.q), 1e-12);
+  EXPECT_EQ(sensor.farthest_m, 5.5);
+  EXPECT_EQ(frames_of(**data)[0].depth->mm, depths(0, own.camera)->mm);
+  // A lens without its pose is a mistake, and so is an image of the camera's size.
+  const std::string yaml = folder + "/mav0/depth0/sensor.yaml";
+  const std::string whole = *read_file(yaml, 1u << 16u), without = whole.substr(whole.find("resolution"));
+  std::ofstream(yaml) << without;
+  const auto placeless = open_dataset(folder);
+  ASSERT_FALSE(placeless);
+  EXPECT_NE(placeless.error().message.find("T_BS"), std::string::npos) << placeless.error().message;
+  std::ofstream(yaml) << "noise_at_1m_m: 0.0025\n";
+  const auto registered = open_dataset(folder);
+  ASSERT_FALSE(registered);
+  EXPECT_NE(registered.error().message.find("40 x 30"), std::string::npos) << registered.error().message;
 }
 
 TEST(EurocFolder, OfADepthRecordingTheCameraAloneCanBeUsed) {

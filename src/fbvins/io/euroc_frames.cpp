@@ -49,7 +49,7 @@ class EurocLoader : public FrameLoader {
     out.frame.right = load_image(entry.right_file, 1, out.right, out);
     for (std::size_t i = 0; i < entry.more_files.size(); ++i)
       out.frame.more.push_back(load_image(entry.more_files[i], static_cast<int>(i) + 2, out.more, out));
-    out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.left, out.depth, out);
+    out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.depth_camera(), out.depth, out);
     return out;
   }
 

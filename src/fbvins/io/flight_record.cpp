@@ -146,7 +146,8 @@ Result<void> FlightRecord::add(const StereoFrame& frame) {
   // The images follow one another, so that a record cut off between them is recognised.
   for (const int i : cameras) write_image(i, frame);
   if (frame.depth && rig_.depth)
-    write(kDepth, frame.t, [&](std::string& out) { append_depth_image(out, frame.t, kLeftFrame, *frame.depth); });
+    write(kDepth, frame.t,
+          [&](std::string& out) { append_depth_image(out, frame.t, rig_.depth->own ? kDepthFrame : kLeftFrame, *frame.depth); });
   for (const int i : cameras) write_camera_info(i, frame.t);
   return flush_if_large();
 }
@@ -167,6 +168,8 @@ void FlightRecord::write_calibration(Time t) {
   std::vector<RosTransform> cameras;
   for (int i = 0; i < rig_.camera_count(); ++i)
     cameras.push_back({kBodyFrame, names[static_cast<std::size_t>(i)], rig_.T_BC(i).q, rig_.T_BC(i).p});
+  if (const auto& depth = rig_.depth; depth && depth->own)
+    cameras.push_back({kBodyFrame, kDepthFrame, depth->own->T_BC.q, depth->own->T_BC.p});
   write(kFixedTransforms, t, [&](std::string& out) { append_transforms(out, t, cameras); });
   calibration_t_ = t;
 }

@@ -216,12 +216,14 @@ TEST_F(FlightRecordTest, OfFourCamerasBreakingOffCostsTheEndOnly) {
 }
 
 TEST_F(FlightRecordTest, KeepsDepths) {
-  rig_ = with_depth(rig_, {});
+  DepthSensor elsewhere;  // with images of another size
+  elsewhere.own = MountedCamera{Camera(PinholeRadtan{20, 21, 19.5, 7.5, 0, 0, 0, 0}, 40, 16), {Quat::Identity(), rig_.T_BC0.p}};
+  rig_ = with_depth(rig_, elsewhere);
   std::vector<SensorEvent> events;
   for (int k = 0; k < 4; ++k) {
     events.emplace_back(reading(50 * k));
     StereoFrame with = frame(50 * k, k != 2, false);
-    auto depth = std::make_shared<DepthImage>(DepthImage{32, 24, std::vector<std::uint16_t>(32 * 24)});
+    auto depth = std::make_shared<DepthImage>(DepthImage{40, 16, std::vector<std::uint16_t>(40 * 16)});
     for (std::size_t i = 0; i < depth->mm.size(); ++i) depth->mm[i] = static_cast<std::uint16_t>(1000 * k + 3 * i);
     if (k != 1) with.depth = depth;
     events.emplace_back(std::move(with));
@@ -229,7 +231,8 @@ TEST_F(FlightRecordTest, KeepsDepths) {
   write(events);
   auto data = open_dataset(path_);
   ASSERT_TRUE(data) << data.error().message;
-  EXPECT_TRUE((*data)->rig().depth);
+  ASSERT_TRUE((*data)->rig().depth && (*data)->rig().depth->own);
+  EXPECT_EQ((*data)->rig().depth->own->camera.intrinsics()[3], 7.5);
   EXPECT_EQ((*data)->info().left.unpaired, 0) << "one camera has no partner";
   const std::vector<SensorEvent> back = drain(**data);
   ASSERT_EQ(back.size(), events.size());

@@ -37,15 +37,16 @@ class McapLoader : public FrameLoader {
     LoadedFrame out;
     out.frame.t = entry.t;
     out.frame.offsets = entry.offsets;
-    const auto load = [&]<class T>(const std::string& file, int camera, ImageCounts& counts, std::shared_ptr<const T>& image) {
-      if (!file.empty()) image = load_image<T>(ImagePlace::of(file), rig_.camera(camera), counts, out);
+    const auto load = [&]<class T>(const std::string& file, const Camera& camera, ImageCounts& counts,
+                                   std::shared_ptr<const T>& image) {
+      if (!file.empty()) image = load_image<T>(ImagePlace::of(file), camera, counts, out);
     };
-    load(entry.left_file, 0, out.left, out.frame.left);
-    load(entry.right_file, 1, out.right, out.frame.right);
+    load(entry.left_file, rig_.left, out.left, out.frame.left);
+    load(entry.right_file, rig_.right, out.right, out.frame.right);
     out.frame.more.resize(entry.more_files.size());
     for (std::size_t i = 0; i < entry.more_files.size(); ++i)
-      load(entry.more_files[i], static_cast<int>(i) + 2, out.more, out.frame.more[i]);
-    load(entry.depth_file, 0, out.depth, out.frame.depth);
+      load(entry.more_files[i], rig_.camera(static_cast<int>(i) + 2), out.more, out.frame.more[i]);
+    load(entry.depth_file, rig_.depth_camera(), out.depth, out.frame.depth);
     return out;
   }
 

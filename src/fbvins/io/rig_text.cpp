@@ -83,7 +83,10 @@ std::string rig_to_yaml(const StereoRig& rig) {
              "  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\nimage_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
              n.max_gyro_radps, n.max_accel_mps2, rig.image_rate_hz, rig.time_offset_s) +
          (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s)) +
-         (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "");
+         (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "") +
+         (rig.depth && rig.depth->own
+              ? camera_text("depth_camera", rig.depth->own->camera) + pose_text("T_BD", rig.depth->own->T_BC)
+              : "");
 }
 
 Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
@@ -101,7 +104,12 @@ Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
   rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
   rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");
   if (yaml.has(yaml.root(), "line_delay_s")) rig.line_delay_s = yaml.number(yaml.root(), "line_delay_s");
-  if (yaml.has(yaml.root(), "depth")) rig = with_depth(rig, read_depth_sensor(yaml, yaml.get(yaml.root(), "depth")));
+  if (yaml.has(yaml.root(), "depth")) {
+    DepthSensor sensor = read_depth_sensor(yaml, yaml.get(yaml.root(), "depth"));
+    if (yaml.has(yaml.root(), "depth_camera"))
+      sensor.own = MountedCamera{read_exact_camera(yaml, "depth_camera"), read_pose<B, C0>(yaml, "T_BD")};
+    rig = with_depth(rig, sensor);
+  }
   if (!yaml.ok()) return yaml.error();
   if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;

@@ -86,13 +86,25 @@ TEST(RigText, GivesBackFourCameras) {
 
 TEST(RigText, GivesBackADepthSensor) {
   Rng rng(14);
-  const DepthSensor sensor{.noise_at_1m_m = 0.01 / 3, .nearest_m = 0.1 / 7, .farthest_m = 20.0 / 3, .scale_sigma = 0.1 / 11};
-  const StereoRig rig = with_depth(awkward_rig(rng, false), sensor);
-  const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
-  ASSERT_TRUE(back) << back.error().message;
-  ASSERT_TRUE(back->depth);
-  EXPECT_TRUE(same(*back->depth, sensor));
-  EXPECT_EQ(back->T_BC1.p, rig.T_BC1.p);
+  DepthSensor sensor{.noise_at_1m_m = 0.01 / 3, .nearest_m = 0.1 / 7, .farthest_m = 20.0 / 3, .scale_sigma = 0.1 / 11};
+  for (const bool elsewhere : {false, true}) {
+    StereoRig rig = awkward_rig(rng, false);
+    if (elsewhere) sensor.own = MountedCamera{rig.right, {rig.T_BC1.q, rig.T_BC0.p + Vec3(0.1 / 3, 0.1 / 7, 0)}};
+    rig = with_depth(rig, sensor);
+    const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
+    ASSERT_TRUE(back) << back.error().message;
+    ASSERT_TRUE(back->depth);
+    EXPECT_EQ(back->depth->noise_at_1m_m, sensor.noise_at_1m_m);
+    EXPECT_EQ(back->depth->nearest_m, sensor.nearest_m);
+    EXPECT_EQ(back->depth->farthest_m, sensor.farthest_m);
+    EXPECT_EQ(back->depth->scale_sigma, sensor.scale_sigma);
+    EXPECT_EQ(back->T_BC1.p, rig.T_BC1.p);
+    ASSERT_EQ(back->depth->own.has_value(), elsewhere);
+    if (!elsewhere) continue;
+    EXPECT_TRUE(same_camera(back->depth->own->camera, sensor.own->camera));
+    EXPECT_TRUE(back->depth->own->T_BC.q.coeffs() == sensor.own->T_BC.q.coeffs() &&
+                back->depth->own->T_BC.p == sensor.own->T_BC.p);
+  }
 }
 
 TEST(RigText, GivesBackTheBitsOfWideLenses) {

@@ -24,7 +24,8 @@ namespace fbvins {
 
 // Names of frames in messages: M, W, G, B, C0, C1 (docs/conventions.md).
 inline constexpr std::string_view kMapFrame = "map", kOdometryFrame = "odom", kGaugeFrame = "gauge", kBodyFrame = "body",
-                                  kLeftFrame = "camera_left", kRightFrame = "camera_right";
+                                  kLeftFrame = "camera_left", kRightFrame = "camera_right",
+                                  kDepthFrame = "depth";  // of a depth sensor that lies elsewhere
 
 /// The frame of camera 0 (left), 1 (right), or a further one: "camera_2".
 std::string camera_frame(int camera);

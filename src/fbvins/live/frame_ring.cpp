@@ -79,9 +79,9 @@ const std::uint8_t* FrameRing::pixels(const SocketFrame& frame, int camera) cons
 
 std::shared_ptr<const DepthImage> FrameRing::depth(const SocketFrame& frame) const {
   if ((frame.images & FBVINS_SOCKET_DEPTH) == 0) return nullptr;
-  auto out = std::make_shared<DepthImage>(DepthImage{layout_.width_px, layout_.height_px, {}});
-  out->mm.resize(layout_.image_bytes());
-  std::memcpy(out->mm.data(), slot(frame) + layout_.depth_offset_bytes, 2 * layout_.image_bytes());
+  auto out = std::make_shared<DepthImage>(DepthImage{layout_.depth_width_px, layout_.depth_height_px, {}});
+  out->mm.resize(layout_.depth_values());
+  std::memcpy(out->mm.data(), slot(frame) + layout_.depth_offset_bytes, 2 * layout_.depth_values());
   return out;
 }
 

@@ -74,6 +74,7 @@ TEST_F(FrameRingTest, ADepthImageBesideThatOfTheCamera) {
   layout.cameras = 1;
   layout.slot_bytes = 2 * kSlotBytes, layout.slots = 2;
   layout.depth_offset_bytes = kSlotBytes;
+  layout.depth_width_px = 40, layout.depth_height_px = 30;
   auto ring = FrameRing::map(memory_, layout, wake_);
   ASSERT_TRUE(ring);
   SocketFrame sent = frame_in(1);
@@ -83,8 +84,9 @@ TEST_F(FrameRingTest, ADepthImageBesideThatOfTheCamera) {
   EXPECT_NE(frame->left, nullptr);
   ASSERT_NE(frame->depth, nullptr);
   std::uint16_t last = 0;
-  std::memcpy(&last, slots_ + 3 * kSlotBytes + 2 * layout.image_bytes() - 2, 2);
-  EXPECT_EQ(frame->depth->row(test::kHeight - 1)[test::kWidth - 1], last);
+  std::memcpy(&last, slots_ + 3 * kSlotBytes + 2 * layout.depth_values() - 2, 2);
+  EXPECT_EQ(frame->depth->mm.size(), 40u * 30u);
+  EXPECT_EQ(frame->depth->row(29)[39], last);
   sent.slot = 0, sent.images = FBVINS_SOCKET_LEFT;
   EXPECT_EQ((*ring)->take(sent)->depth, nullptr);
 }

@@ -16,10 +16,13 @@ constexpr std::size_t kMostMemory_bytes = std::size_t{1} << 30U;
 /// Stamps beyond this (146 years) could overflow in differences.
 constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
-/// What the messages had in versions 1.1, 1.2 and 1.3.
+constexpr auto kLargestSide_px = static_cast<std::uint32_t>(kLargestImageSide_px);
+
+/// What the messages had in versions 1.1, 1.2, 1.3 and 1.4.
 constexpr std::size_t kFirstHello_bytes = offsetof(FbvinsSocketHello, cameras);
 constexpr std::size_t kSecondHello_bytes = offsetof(FbvinsSocketHello, depth_offset_bytes);
 constexpr std::size_t kThirdHello_bytes = offsetof(FbvinsSocketHello, times);
+constexpr std::size_t kFourthHello_bytes = offsetof(FbvinsSocketHello, depth_width_px);
 constexpr std::size_t kFirstFrame_bytes = offsetof(FbvinsSocketFrame, offset_ns);
 /// Images of one frame lie closer together than this.
 constexpr std::int64_t kLongestOffset_ns = 1'000'000'000;
@@ -27,7 +30,8 @@ constexpr std::int64_t kLongestOffset_ns = 1'000'000'000;
 static_assert(kFirstHello_bytes == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
 static_assert(kSecondHello_bytes == kFirstHello_bytes + 32 + 6 * sizeof(FbvinsSocketCamera));
 static_assert(kThirdHello_bytes == kSecondHello_bytes + 8 + sizeof(FbvinsSocketDepth) && sizeof(FbvinsSocketDepth) == 32);
-static_assert(sizeof(FbvinsSocketHello) == kThirdHello_bytes + 8 * sizeof(FbvinsSocketTimes) && sizeof(FbvinsSocketTimes) == 16);
+static_assert(kFourthHello_bytes == kThirdHello_bytes + 8 * sizeof(FbvinsSocketTimes) && sizeof(FbvinsSocketTimes) == 16);
+static_assert(sizeof(FbvinsSocketHello) == kFourthHello_bytes + 8 + sizeof(FbvinsSocketCamera));
 static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
@@ -61,7 +65,14 @@ Result<void> place_depth(const FbvinsSocketHello& hello, FrameLayout& layout) {
   if ((hello.flags & FBVINS_SOCKET_HAS_DEPTH) == 0) return {};
   if (layout.cameras != 1)
     return malformed(fmt::format("hello: a depth sensor goes with one camera, and there are {}", layout.cameras));
-  const std::size_t at = hello.depth_offset_bytes, size = 2 * layout.image_bytes();
+  layout.depth_width_px = layout.width_px, layout.depth_height_px = layout.height_px;
+  if ((hello.flags & FBVINS_SOCKET_HAS_DEPTH_CAMERA) != 0) {
+    const std::uint32_t width = hello.depth_width_px, height = hello.depth_height_px;
+    if (width < 1 || height < 1 || width > kLargestSide_px || height > kLargestSide_px)
+      return malformed(fmt::format("hello: depth images of {} x {} pixels", width, height));
+    layout.depth_width_px = static_cast<int>(width), layout.depth_height_px = static_cast<int>(height);
+  }
+  const std::size_t at = hello.depth_offset_bytes, size = 2 * layout.depth_values();
   if (at < layout.image_bytes() || at % 2 != 0 || layout.slot_bytes % 2 != 0 || layout.slot_bytes < at + size)
     return malformed(
         fmt::format("hello: a depth image of {} bytes at {} does not fit into a slot of {} bytes", size, at, layout.slot_bytes));
@@ -70,8 +81,7 @@ Result<void> place_depth(const FbvinsSocketHello& hello, FrameLayout& layout) {
 }
 
 Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
-  constexpr auto kLargest = static_cast<std::uint32_t>(kLargestImageSide_px);
-  if (hello.width_px < 1 || hello.height_px < 1 || hello.width_px > kLargest || hello.height_px > kLargest)
+  if (hello.width_px < 1 || hello.height_px < 1 || hello.width_px > kLargestSide_px || hello.height_px > kLargestSide_px)
     return malformed(fmt::format("hello: images of {} x {} pixels", hello.width_px, hello.height_px));
   if (hello.slots < 2 || hello.slots > FBVINS_SOCKET_MOST_SLOTS)
     return malformed(fmt::format("hello: {} slots, not 2 to {}", hello.slots, int{FBVINS_SOCKET_MOST_SLOTS}));
@@ -100,7 +110,8 @@ Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
 
 /// Up to the last field that is filled.
 std::size_t size_of_hello(std::uint32_t flags) {
-  if ((flags & FBVINS_SOCKET_HAS_TIMES) != 0) return sizeof(FbvinsSocketHello);
+  if ((flags & FBVINS_SOCKET_HAS_DEPTH_CAMERA) != 0) return sizeof(FbvinsSocketHello);
+  if ((flags & FBVINS_SOCKET_HAS_TIMES) != 0) return kFourthHello_bytes;
   if ((flags & FBVINS_SOCKET_HAS_DEPTH) != 0) return kThirdHello_bytes;
   return (flags & FBVINS_SOCKET_HAS_CAMERAS) != 0 ? kSecondHello_bytes : kFirstHello_bytes;
 }
@@ -125,7 +136,13 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
   if ((hello->flags & FBVINS_SOCKET_HAS_RIG) == 0) return SocketMessage(std::move(out));
   out.rig = SocketRig{hello->rig, layout->cameras};
   std::copy_n(hello->more, std::max(0, layout->cameras - 2), out.rig->more.begin());
-  if (layout->depth_offset_bytes > 0) out.rig->depth = hello->depth;
+  if (layout->depth_offset_bytes > 0) {
+    out.rig->depth = hello->depth;
+    if ((hello->flags & FBVINS_SOCKET_HAS_DEPTH_CAMERA) != 0) {
+      out.rig->depth_camera = hello->depth_camera;
+      out.rig->depth_width_px = layout->depth_width_px, out.rig->depth_height_px = layout->depth_height_px;
+    }
+  }
   if ((hello->flags & FBVINS_SOCKET_HAS_TIMES) != 0) out.rig->times = std::to_array(hello->times);
   const auto rig = parse_socket_rig(*out.rig, layout->width_px, layout->height_px);
   if (!rig) return rig.error();

@@ -34,8 +34,12 @@ struct FrameLayout {
   int cameras = 2;
   std::array<std::size_t, kMostCameras> offset_bytes{};  ///< of each camera's image in a slot
   std::size_t depth_offset_bytes = 0;                    ///< of the depth image; 0: there is none
+  int depth_width_px = 0, depth_height_px = 0;           ///< of the depth image, where there is one
 
   std::size_t image_bytes() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+  std::size_t depth_values() const {
+    return static_cast<std::size_t>(depth_width_px) * static_cast<std::size_t>(depth_height_px);
+  }
   std::size_t bytes() const { return static_cast<std::size_t>(slots) * slot_bytes; }
 };
 
@@ -45,6 +49,8 @@ struct SocketRig {
   int cameras = 2;
   std::array<FbvinsSocketCamera, kMostCameras - 2> more{};  ///< zeros beyond their count
   std::optional<FbvinsSocketDepth> depth = {};
+  FbvinsSocketCamera depth_camera{};                                      ///< of a depth sensor that lies elsewhere
+  int depth_width_px = 0, depth_height_px = 0;                            ///< of its images; 0: they are registered to the camera
   std::optional<std::array<FbvinsSocketTimes, kMostCameras>> times = {};  ///< none: all cameras have those of `pair`
 };
 bool same(const SocketRig& a, const SocketRig& b);

@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.5 of the protocol, this program 1.5");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.6 of the protocol, this program 1.6");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -76,7 +76,7 @@ TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
   EXPECT_EQ(with([](auto& h) { h.right_offset_bytes = 0xfffff000u; }),
             "hello: 2 images of 3072 bytes, that of camera 1 at 4294963200, do not fit into a slot of 8192 bytes");
   EXPECT_EQ(with([](auto& h) { h.slots = 64, h.slot_bytes = 0x7fffffffu; }), "hello: 137438953408 bytes of images, over 1 GiB");
-  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1680 bytes says that it has 12");
+  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1856 bytes says that it has 12");
   EXPECT_EQ(with([](auto& h) { std::memset(h.name, 0x1b, sizeof(h.name)); }), "taken");
 }
 
@@ -314,6 +314,43 @@ TEST(SocketMessage, HelloOfACameraWithADepthSensor) {
   EXPECT_EQ(refusal(bytes_of(hello)), "hello: a depth sensor goes with one camera, and there are 2");
   hello.header.size_bytes = 1512;
   EXPECT_EQ(refusal(bytes_of(hello, 1512)), "hello of 1512 bytes where 1552 are needed");
+}
+
+TEST(SocketMessage, ADepthSensorThatLiesElsewhereHasItsLensAndPoseSinceVersion16) {
+  DepthSensor sensor;
+  sensor.own = MountedCamera{Camera(KannalaBrandt{30, 31, 19.5, 14.5, 0.0625, -0.03125, 0, 0}, 40, 30),
+                             {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, -0.0625, 0.125)}};
+  const StereoRig rig = with_depth(test::socket_test_rig(), sensor);
+  FbvinsSocketHello hello = hello_message(&rig);
+  hello.depth_offset_bytes = test::kImageBytes;
+  const auto message = parse_socket_message(bytes_of(hello));
+  ASSERT_TRUE(message) << message.error().message;
+  const auto& taken = std::get<SocketHello>(*message);
+  EXPECT_EQ(taken.layout.depth_values(), 40u * 30u);
+  const auto back = parse_socket_rig(*taken.rig, test::kWidth, test::kHeight);
+  ASSERT_TRUE(back) << back.error().message;
+  ASSERT_TRUE(back->depth && back->depth->own);
+  const MountedCamera& own = *back->depth->own;
+  EXPECT_EQ(own.camera.width(), 40);
+  EXPECT_EQ(own.camera.model_name(), "pinhole-equidistant");
+  EXPECT_EQ(own.camera.distortion(), sensor.own->camera.distortion());
+  EXPECT_EQ(own.T_BC.p, sensor.own->T_BC.p);
+  EXPECT_FALSE(same(*taken.rig, socket_rig(with_depth(test::socket_test_rig(), {}))));
+
+  const auto with = [&](auto change) {
+    FbvinsSocketHello other = hello;
+    change(other);
+    return refusal(bytes_of(other));
+  };
+  EXPECT_EQ(with([](auto& h) { h.depth_height_px = 0; }), "hello: depth images of 40 x 0 pixels");
+  EXPECT_EQ(with([](auto& h) { h.depth_height_px = 100; }),
+            "hello: a depth image of 8000 bytes at 3072 does not fit into a slot of 8192 bytes");
+  EXPECT_EQ(with([](auto& h) { h.depth_camera.focal_px[0] = -1; }),
+            "calibration: the depth camera's intrinsics are not finite, with positive focal lengths");
+  EXPECT_EQ(with([](auto& h) { h.depth_camera.T_BC[0] = 2; }),
+            "calibration: the depth camera's T_BC is not a rotation and a translation");
+  hello.header.size_bytes = offsetof(FbvinsSocketHello, depth_width_px);
+  EXPECT_EQ(refusal(bytes_of(hello, hello.header.size_bytes)), "hello of 1680 bytes where 1856 are needed");
 }
 
 TEST(SocketMessage, WhatADeviceSaysOfItself) {

@@ -100,7 +100,9 @@ FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mount
 bool same(const SocketRig& a, const SocketRig& b) {
   return a.cameras == b.cameras && std::memcmp(&a.pair, &b.pair, sizeof(a.pair)) == 0 &&
          std::memcmp(a.more.data(), b.more.data(), sizeof(a.more)) == 0 && a.depth.has_value() == b.depth.has_value() &&
-         (!a.depth || std::memcmp(&*a.depth, &*b.depth, sizeof(*a.depth)) == 0) && a.times.has_value() == b.times.has_value() &&
+         (!a.depth || std::memcmp(&*a.depth, &*b.depth, sizeof(*a.depth)) == 0) && a.depth_width_px == b.depth_width_px &&
+         a.depth_height_px == b.depth_height_px && std::memcmp(&a.depth_camera, &b.depth_camera, sizeof(a.depth_camera)) == 0 &&
+         a.times.has_value() == b.times.has_value() &&
          (!a.times || std::memcmp(a.times->data(), b.times->data(), sizeof(*a.times)) == 0);
 }
 
@@ -124,7 +126,17 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
   StereoRig out = with_times(with_cameras({}, cameras), *times);
   out.imu_noise = noise;
   out.image_rate_hz = rig.image_rate_hz;
-  if (const auto& d = sent.depth) out = with_depth(out, {d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma});
+  if (const auto& d = sent.depth) {
+    DepthSensor sensor{d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma};
+    if (sent.depth_width_px > 0) {
+      const auto lens = camera_of(sent.depth_camera, sent.depth_width_px, sent.depth_height_px, "depth");
+      if (!lens) return lens.error();
+      const auto T_BC = mounting_of(sent.depth_camera, "depth");
+      if (!T_BC) return T_BC.error();
+      sensor.own = MountedCamera{*lens, *T_BC};
+    }
+    out = with_depth(out, sensor);
+  }
   if (Result<void> good = check_rig(out, "calibration"); !good) return good.error();
   return out;
 }
@@ -142,6 +154,11 @@ SocketRig socket_rig(const StereoRig& rig) {
       (*out.times)[static_cast<std::size_t>(i)] = {rig.times(i).time_offset_s, rig.times(i).line_delay_s};
   }
   if (const auto& d = rig.depth) out.depth = FbvinsSocketDepth{d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma};
+  if (rig.depth && rig.depth->own) {
+    const auto& [camera, T_BC] = *rig.depth->own;
+    out.depth_camera = camera_message(camera, T_BC);
+    out.depth_width_px = camera.width(), out.depth_height_px = camera.height();
+  }
   return out;
 }
 

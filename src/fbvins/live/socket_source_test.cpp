@@ -225,7 +225,7 @@ TEST_F(SocketSourceTest, WrongHellosAreRefusedWithTheReason) {
   const FileDescriptor memory = test::test_memory();
   FbvinsSocketHello hello = hello_message(nullptr);
   hello.major = 2;
-  EXPECT_EQ(refusal(hello, memory), "the sender speaks version 2.5 of the protocol, this program 1.5");
+  EXPECT_EQ(refusal(hello, memory), "the sender speaks version 2.6 of the protocol, this program 1.6");
   EXPECT_EQ(refusal(hello_message(nullptr), test::test_memory(test::kSlots * test::kSlotBytes, F_SEAL_GROW)),
             "the images' memory is not sealed with F_SEAL_SHRINK");
   EXPECT_EQ(refusal(hello_message(nullptr), FileDescriptor()), "hello: 0 file descriptors instead of one");

@@ -61,6 +61,11 @@ inline FbvinsSocketHello hello_message(const StereoRig* rig) {
   if (!sent.depth) return hello;
   hello.flags |= FBVINS_SOCKET_HAS_DEPTH;
   hello.depth = *sent.depth;
+  if (sent.depth_width_px == 0) return hello;
+  hello.flags |= FBVINS_SOCKET_HAS_DEPTH_CAMERA;
+  hello.depth_camera = sent.depth_camera;
+  hello.depth_width_px = static_cast<std::uint32_t>(sent.depth_width_px);
+  hello.depth_height_px = static_cast<std::uint32_t>(sent.depth_height_px);
   return hello;
 }
 

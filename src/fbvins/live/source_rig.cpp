@@ -36,4 +36,16 @@ Result<StereoRig> rig_for_source(const SourceOptions& options, std::string_view 
                                                         rig->camera_count() == 1 ? "" : "s", cameras, what)};
 }
 
+Result<StereoRig> depth_rig_for_source(const SourceOptions& options, std::string_view what) {
+  const std::string& chain = options.dataset.kalibr_camchain;
+  const Result<StereoRig> rig = rig_for_source(options, what, chain.empty() ? 1 : 0);
+  if (!rig) return rig;
+  if (rig->camera_count() > 2)
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("{}: has {} cameras, and there are one and a depth sensor", chain, rig->camera_count())};
+  DepthSensor sensor;
+  if (rig->has_right()) sensor.own = rig->mounted(1);
+  return with_depth(*rig, sensor);
+}
+
 }  // namespace fbvins

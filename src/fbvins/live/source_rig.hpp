@@ -14,4 +14,8 @@ namespace fbvins {
 /// or the calibration has another number of cameras; 0 cameras: any number. `what` names the sensors in sentences.
 Result<StereoRig> rig_for_source(const SourceOptions& options, std::string_view what, int cameras);
 
+/// The same for one camera and a depth sensor: registered to it where the calibration has one camera; of two cameras the second
+/// is the depth sensor's, whose images are not registered.
+Result<StereoRig> depth_rig_for_source(const SourceOptions& options, std::string_view what);
+
 }  // namespace fbvins

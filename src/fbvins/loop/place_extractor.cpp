@@ -53,7 +53,7 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
       stage_(std::move(stage)),
       focal_px_(rig.left.focal_px()),
       orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()) {
-  if (rig.depth) depth_.emplace(*rig.depth, rig.left);
+  if (rig.depth) depth_.emplace(rig);
 }
 
 Place PlaceExtractor::extract(const Keyframe& keyframe) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 
 #include "fbvins/live/host_clock.hpp"
@@ -33,10 +34,12 @@ struct Wanted {
   rs2_format format;
   const char* name;
 };
-constexpr Wanted kWanted[] = {{RS2_STREAM_INFRARED, 1, RS2_FORMAT_Y8, "left infrared"},
-                              {RS2_STREAM_INFRARED, 2, RS2_FORMAT_Y8, "right infrared"},
-                              {RS2_STREAM_GYRO, 0, RS2_FORMAT_MOTION_XYZ32F, "gyroscope"},
-                              {RS2_STREAM_ACCEL, 0, RS2_FORMAT_MOTION_XYZ32F, "accelerometer"}};
+using WantedStreams = std::array<Wanted, 4>;
+constexpr WantedStreams kPair = {{{RS2_STREAM_INFRARED, 1, RS2_FORMAT_Y8, "left infrared"},
+                                  {RS2_STREAM_INFRARED, 2, RS2_FORMAT_Y8, "right infrared"},
+                                  {RS2_STREAM_GYRO, 0, RS2_FORMAT_MOTION_XYZ32F, "gyroscope"},
+                                  {RS2_STREAM_ACCEL, 0, RS2_FORMAT_MOTION_XYZ32F, "accelerometer"}}};
+constexpr WantedStreams kWithDepth = {{kPair[0], {RS2_STREAM_DEPTH, 0, RS2_FORMAT_Z16, "depth"}, kPair[2], kPair[3]}};
 
 void set(const rs2::sensor& sensor, rs2_option option, float value) {
   if (sensor.supports(option) && !sensor.is_option_read_only(option)) sensor.set_option(option, value);
@@ -51,6 +54,17 @@ void limit_exposure(const rs2::sensor& sensor) {
 }
 
 std::string mode_text(int width_px, int height_px, int rate_hz) { return fmt::format("{}x{}@{}", width_px, height_px, rate_hz); }
+
+const std::uint8_t* row_of(const rs2::video_frame& frame, int y) {
+  return static_cast<const std::uint8_t*>(frame.get_data()) + static_cast<std::ptrdiff_t>(y) * frame.get_stride_in_bytes();
+}
+
+std::shared_ptr<const Image> image_of(const rs2::video_frame& frame) {
+  auto image = std::make_shared<Image>(frame.get_width(), frame.get_height());
+  for (int y = 0; y < frame.get_height(); ++y)
+    std::memcpy(image->row(y), row_of(frame, y), static_cast<std::size_t>(frame.get_width()));
+  return image;
+}
 
 Vec3 vector(const rs2_vector& v) { return Vec3(v.x, v.y, v.z); }
 
@@ -96,11 +110,12 @@ Result<void> RealsenseCamera::choose() {
   const RealsenseMode near = wanted_.width_px == 0 ? kPreferred
                                                    : RealsenseMode{wanted_.width_px, wanted_.height_px,
                                                                    wanted_.rate_hz == 0 ? kPreferred.rate_hz : wanted_.rate_hz};
+  const WantedStreams& all_wanted = wanted_.depth ? kWithDepth : kPair;
   std::vector<rs2::stream_profile> chosen;
   for (rs2::sensor& sensor : device_.query_sensors()) {
     Stream stream{.sensor = sensor};
     const auto profiles = sensor.get_stream_profiles();
-    for (const Wanted& wanted : kWanted) {
+    for (const Wanted& wanted : all_wanted) {
       std::optional<rs2::stream_profile> best;
       for (const rs2::stream_profile& profile : profiles) {
         const bool fits = profile.stream_type() == wanted.stream && profile.format() == wanted.format &&
@@ -121,10 +136,11 @@ Result<void> RealsenseCamera::choose() {
       return profile.stream_type() == wanted.stream && (wanted.index == 0 || profile.stream_index() == wanted.index);
     });
   };
-  for (const Wanted& wanted : kWanted)
+  for (const Wanted& wanted : all_wanted)
     if (find(wanted) == chosen.end())
       return Error{ErrorCode::unsupported, fmt::format("the camera {} has no {}", realsense_name(device_), wanted.name)};
-  const auto left = find(kWanted[0])->as<rs2::video_stream_profile>(), right = find(kWanted[1])->as<rs2::video_stream_profile>();
+  const auto left = find(all_wanted[0])->as<rs2::video_stream_profile>(),
+             second = find(all_wanted[1])->as<rs2::video_stream_profile>();
   width_px_ = left.width(), height_px_ = left.height();
   mode_ = mode_text(width_px_, height_px_, left.fps());
   if (wanted_.width_px > 0 &&
@@ -133,9 +149,17 @@ Result<void> RealsenseCamera::choose() {
                  fmt::format("the camera {} has no mode {}x{}{}, but {}", realsense_name(device_), wanted_.width_px,
                              wanted_.height_px, wanted_.rate_hz == 0 ? "" : fmt::format("@{}", wanted_.rate_hz), modes(false))};
   imu_calibrated_ =
-      is_calibrated(find(kWanted[2])->as<rs2::motion_stream_profile>(), find(kWanted[3])->as<rs2::motion_stream_profile>());
+      is_calibrated(find(all_wanted[2])->as<rs2::motion_stream_profile>(), find(all_wanted[3])->as<rs2::motion_stream_profile>());
   try {
-    rig_ = realsense_rig(left, right, find(kWanted[2])->as<rs2::motion_stream_profile>());
+    double baseline_mm = 50;  // the D435i's
+    for (const Stream& stream : streams_) {
+      if (!stream.is_stereo) continue;
+      if (stream.sensor.supports(RS2_OPTION_STEREO_BASELINE))
+        baseline_mm = static_cast<double>(stream.sensor.get_option(RS2_OPTION_STEREO_BASELINE));
+      if (stream.sensor.supports(RS2_OPTION_DEPTH_UNITS))
+        unit_mm_ = 1e3 * static_cast<double>(stream.sensor.get_option(RS2_OPTION_DEPTH_UNITS));
+    }
+    rig_ = realsense_rig(left, second, find(all_wanted[2])->as<rs2::motion_stream_profile>(), 1e-3 * std::abs(baseline_mm));
   } catch (const rs2::error& e) {
     rig_ = error_of("the calibration of " + realsense_name(device_), e);
   }
@@ -225,13 +249,22 @@ void RealsenseCamera::take_image(const rs2::video_frame& frame, Time t, SensorIn
     seen_.exposure_ms = 1e-3 * static_cast<double>(frame.get_frame_metadata(RS2_FRAME_METADATA_ACTUAL_EXPOSURE));
   if (frame.supports_frame_metadata(RS2_FRAME_METADATA_FRAME_EMITTER_MODE))
     (frame.get_frame_metadata(RS2_FRAME_METADATA_FRAME_EMITTER_MODE) == 0 ? seen_.emitter_off : seen_.emitter_on) = true;
-  auto image = std::make_shared<Image>(frame.get_width(), frame.get_height());
-  const auto* pixels = static_cast<const std::uint8_t*>(frame.get_data());
-  for (int y = 0; y < frame.get_height(); ++y)
-    std::memcpy(image->row(y), pixels + static_cast<std::ptrdiff_t>(y) * frame.get_stride_in_bytes(),
-                static_cast<std::size_t>(frame.get_width()));
-  pairs_.add(frame.get_profile().stream_index() == 2 ? 1 : 0, t, std::move(image));
+  if (frame.get_profile().stream_type() == RS2_STREAM_DEPTH) pairs_.add_depth(t, depth_of(frame));
+  else pairs_.add(frame.get_profile().stream_index() == 2 ? 1 : 0, t, image_of(frame));
   while (auto pair = pairs_.next()) input.push(*std::move(pair));
+}
+
+std::shared_ptr<const DepthImage> RealsenseCamera::depth_of(const rs2::video_frame& frame) const {
+  auto depth = std::make_shared<DepthImage>(DepthImage{frame.get_width(), frame.get_height(), {}});
+  const auto width = static_cast<std::size_t>(frame.get_width());
+  depth->mm.resize(width * static_cast<std::size_t>(frame.get_height()));
+  for (int y = 0; y < frame.get_height(); ++y)
+    std::memcpy(depth->mm.data() + static_cast<std::size_t>(y) * width, row_of(frame, y), 2 * width);
+  constexpr double kMost_mm = std::numeric_limits<std::uint16_t>::max();
+  if (std::abs(unit_mm_ - 1) > 1e-6)
+    for (std::uint16_t& value : depth->mm)
+      value = static_cast<std::uint16_t>(value * unit_mm_ > kMost_mm ? 0 : std::lround(value * unit_mm_));
+  return depth;
 }
 
 void RealsenseCamera::take_motion(const rs2::motion_frame& frame, Time t, SensorInput& input) {

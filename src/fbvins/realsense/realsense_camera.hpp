@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One RealSense camera with an IMU, plugged in or played from a file: its factory calibration, and its streams as sensor events.
-// Left and right infrared, emitter off; gyroscope and accelerometer as one IMU, which is B; stamps in the library's global time,
-// the same for all streams. The library's exceptions become Errors.
+// Left and right infrared, or the left one and the depth images that the device makes of both, emitter off; gyroscope and
+// accelerometer as one IMU, which is B; stamps in the library's global time, the same for all streams. The library's exceptions
+// become Errors.
 #pragma once
 
 #include <array>
@@ -23,13 +24,16 @@
 namespace fbvins {
 
 /// The factory calibration of both cameras and the IMU; the IMU's noise is the data sheet's. An error where a stream's lens model
-/// is not supported.
-Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2::video_stream_profile& right,
-                                const rs2::motion_stream_profile& gyro);
+/// is not supported. Where `second` is the stream of depth images the rig is one of the left camera with a depth sensor, whose
+/// noise follows from `baseline_m`.
+Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2::video_stream_profile& second,
+                                const rs2::motion_stream_profile& gyro, double baseline_m);
 
-/// Size and rate of the images that are wanted; 0: whatever is nearest to 640 x 480 at 30 Hz.
+/// Size and rate of the images that are wanted; 0: whatever is nearest to 640 x 480 at 30 Hz. `depth`: depth images in the place
+/// of the right ones.
 struct RealsenseMode {
   int width_px = 0, height_px = 0, rate_hz = 0;
+  bool depth = false;
 };
 
 /// What images say of themselves, where driver and firmware pass it on.
@@ -85,6 +89,7 @@ class RealsenseCamera {
   void set_options();
   void take(const rs2::frame& frame, SensorInput& input);
   void take_image(const rs2::video_frame& frame, Time t, SensorInput& input);
+  std::shared_ptr<const DepthImage> depth_of(const rs2::video_frame& frame) const;
   void take_motion(const rs2::motion_frame& frame, Time t, SensorInput& input);
   void say_once(const std::string& sentence);
 
@@ -96,6 +101,7 @@ class RealsenseCamera {
   bool imu_calibrated_ = false;
   Result<StereoRig> rig_ = StereoRig{};
   int width_px_ = 0, height_px_ = 0;
+  double unit_mm_ = 1;  ///< of the depth images' values
   std::vector<Stream> streams_;
   std::mutex mutex_;  // guards what follows: each sensor has a thread of its own
   FrameJoiner pairs_{2};

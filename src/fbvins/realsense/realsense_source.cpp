@@ -28,11 +28,16 @@ bool fits(const StereoRig& rig, const RealsenseCamera& camera) {
 }  // namespace
 
 RealsenseName parse_realsense_name(const std::string& text) {
-  static const std::regex kMode(R"((?:(.*):)?(\d{1,5})x(\d{1,5})(?:@(\d{1,4}))?)");
+  static const std::regex kMode(R"((?:(.*):)?(\d{1,5})x(\d{1,5})(?:@(\d{1,4}))?)"), kDepth("(?:(.*):)?depth");
+  RealsenseName name{text, {}};
   std::smatch found;
-  if (!std::regex_match(text, found, kMode)) return {text, {}};
-  const auto number = [&](std::size_t i) { return found[i].matched ? std::stoi(found[i]) : 0; };
-  return {found[1].str(), {.width_px = number(2), .height_px = number(3), .rate_hz = number(4)}};
+  if (std::regex_match(text, found, kMode)) {
+    const auto number = [&](std::size_t i) { return found[i].matched ? std::stoi(found[i]) : 0; };
+    name = {found[1].str(), {.width_px = number(2), .height_px = number(3), .rate_hz = number(4)}};
+  }
+  const std::string before = name.which;
+  if (std::regex_match(before, found, kDepth)) name.which = found[1].str(), name.mode.depth = true;
+  return name;
 }
 
 RealsenseSource::RealsenseSource(rs2::context context, std::string which, SourceOptions options)
@@ -138,6 +143,13 @@ Result<void> RealsenseSource::set_rig() {
           : load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
   if (!rig) return rig.error();
   rig_ = *rig;
+  if (mode_.depth && !own) {  // of the files the left camera; what they do not know is the device's
+    const Result<StereoRig>& device = camera_->rig();
+    if (!device) return device.error();
+    DepthSensor sensor = *device->depth;
+    if (sensor.own) sensor.own->T_BC = rig_.T_BC0 * (device->T_BC0.inverse() * sensor.own->T_BC);
+    rig_ = with_depth(rig_, sensor);
+  }
   if (fits(rig_, *camera_)) return {};
   return Error{ErrorCode::invalid_argument, fmt::format("{} is of {} x {} pixels, the camera delivers {} x {}",
                                                         own ? "its calibration" : files.kalibr_camchain, rig_.left.width(),
@@ -195,7 +207,7 @@ Result<void> RealsenseSource::run(SensorInput& input) {
 
 Result<void> RealsenseSource::start_camera(SensorInput& input) {
   const auto tolerance = Duration::from_seconds(1e-3 * options_.dataset.pair_tolerance_ms);
-  return camera_->start(input, FrameJoiner(2, false, tolerance, own_offsets(rig_)));
+  return camera_->start(input, FrameJoiner(rig_.camera_count(), rig_.depth.has_value(), tolerance, own_offsets(rig_)));
 }
 
 /// Starts the streams again that have stopped though the camera is there.

@@ -26,8 +26,8 @@ RealsenseName parse_realsense_name(const std::string& text);
 
 class RealsenseSource final : public Source {
  public:
-  /// `which`: a serial number, a file that ends in .bag, or empty for any camera, each with [:]WIDTHxHEIGHT[@HZ] at its end or
-  /// without. Waits for it until `options.give_up`. The rig
+  /// `which`: a serial number, a file that ends in .bag, or empty for any camera, each with [:]depth and [:]WIDTHxHEIGHT[@HZ] at
+  /// its end or without. Waits for it until `options.give_up`. The rig
   /// is the device's own; Kalibr's, where `options.dataset` names one. A camera that is unplugged in flight is waited for.
   static Result<std::unique_ptr<RealsenseSource>> open(const std::string& which, const SourceOptions& options);
   /// With the devices of `context`.

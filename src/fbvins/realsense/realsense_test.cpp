@@ -202,7 +202,8 @@ TEST(Realsense, TakesTheWantedMode) {
 TEST(Realsense, NamesOfCamerasAndModes) {
   const auto parsed = [](const std::string& text) {
     const RealsenseName name = parse_realsense_name(text);
-    return fmt::format("{} {} {} {}", name.which, name.mode.width_px, name.mode.height_px, name.mode.rate_hz);
+    return fmt::format("{} {} {} {}{}", name.which, name.mode.width_px, name.mode.height_px, name.mode.rate_hz,
+                       name.mode.depth ? " depth" : "");
   };
   EXPECT_EQ(parsed(""), " 0 0 0");
   EXPECT_EQ(parsed("123456"), "123456 0 0 0");
@@ -210,6 +211,10 @@ TEST(Realsense, NamesOfCamerasAndModes) {
   EXPECT_EQ(parsed("848x480"), " 848 480 0");
   EXPECT_EQ(parsed("123456:848x480@30"), "123456 848 480 30");
   EXPECT_EQ(parsed("a/b:c.bag"), "a/b:c.bag 0 0 0");
+  EXPECT_EQ(parsed("depth"), " 0 0 0 depth");
+  EXPECT_EQ(parsed("depth:848x480@60"), " 848 480 60 depth");
+  EXPECT_EQ(parsed("a/depth.bag:depth"), "a/depth.bag 0 0 0 depth");
+  EXPECT_EQ(parsed("123456:depth:848x480"), "123456 848 480 0 depth");
 }
 
 /// A recorded camera whose images pause for three seconds.

@@ -30,11 +30,17 @@ class SoftwareCamera {
     const int rate_hz = static_cast<int>(rig.image_rate_hz), imu_rate_hz = static_cast<int>(rig.imu_noise.rate_hz);
     left_ = stereo_.add_video_stream(video_stream(1, rig.left, rate_hz));
     right_ = stereo_.add_video_stream(video_stream(2, rig.right, rate_hz));
+    depth_ = stereo_.add_video_stream(depth_stream(rig.depth_camera(), rate_hz));
+    stereo_.add_read_only_option(RS2_OPTION_DEPTH_UNITS, 0.0001f);
+    stereo_.add_read_only_option(RS2_OPTION_STEREO_BASELINE, 95);
     for (int index : {1, 2}) wide_[index - 1] = stereo_.add_video_stream(wide_stream(index));
     gyro_ = motion_.add_motion_stream({RS2_STREAM_GYRO, 0, 3, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
     accel_ = motion_.add_motion_stream({RS2_STREAM_ACCEL, 0, 4, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
     left_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
     right_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
+    const Pose<B, C0> T_BD = rig.depth && rig.depth->own ? rig.depth->own->T_BC : rig.T_BC0;
+    depth_.register_extrinsics_to(gyro_, extrinsics(T_BD));
+    depth_.register_extrinsics_to(left_, extrinsics(rig.T_BC0.inverse() * T_BD));
     wide_[0].register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
     wide_[1].register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
     accel_.register_extrinsics_to(gyro_, extrinsics(Pose<B, B>()));
@@ -57,6 +63,14 @@ class SoftwareCamera {
         {pixels, release<std::uint8_t>, image.width(), 1, milliseconds(t), domain, ++number_, profile.get(), 0});
   }
 
+  /// In tenths of a millimetre.
+  void depth(Time t, const DepthImage& image) {
+    auto* values = new std::uint16_t[image.mm.size()];
+    std::copy(image.mm.begin(), image.mm.end(), values);
+    stereo_.on_video_frame(
+        {values, release<std::uint16_t>, 2 * image.width, 2, milliseconds(t), domain, ++number_, depth_.get(), 1e-4f});
+  }
+
   rs2_timestamp_domain domain = RS2_TIMESTAMP_DOMAIN_GLOBAL_TIME;
 
  private:
@@ -75,6 +89,11 @@ class SoftwareCamera {
     const double coefficients[] = {k.k1, k.k2, k.p1, k.p2};
     for (int i = 0; i < 4; ++i) lens.coeffs[i] = static_cast<float>(coefficients[i]);
     return {RS2_STREAM_INFRARED, index, index, lens.width, lens.height, rate_hz, 1, RS2_FORMAT_Y8, lens};
+  }
+  static rs2_video_stream depth_stream(const Camera& camera, int rate_hz) {
+    rs2_video_stream stream = video_stream(0, camera, rate_hz);
+    stream.type = RS2_STREAM_DEPTH, stream.fmt = RS2_FORMAT_Z16, stream.bpp = 2, stream.uid = 20;
+    return stream;
   }
   /// Another mode of the same camera, 848 x 480 at 60 Hz.
   static rs2_video_stream wide_stream(int index) {
@@ -98,7 +117,7 @@ class SoftwareCamera {
 
   rs2::software_device device_;
   rs2::software_sensor stereo_, motion_;
-  rs2::stream_profile left_, right_, gyro_, accel_;
+  rs2::stream_profile left_, right_, depth_, gyro_, accel_;
   rs2::stream_profile wide_[2];
   int number_ = 0;
 };

@@ -42,6 +42,11 @@ Result<std::unique_ptr<Ros2ImageSink>> Ros2ImageSink::create(const std::shared_p
   auto depth = Ros2Publisher::create(node, node->own_topic("depth/image_raw"), "sensor_msgs/msg/Image", kQuality);
   if (!depth) return depth.error();
   sink->depth_ = std::move(*depth);
+  if (!rig.depth->own) return sink;
+  auto info = Ros2Publisher::create(node, node->own_topic("depth/camera_info"), "sensor_msgs/msg/CameraInfo", kQuality);
+  if (!info) return info.error();
+  sink->depth_info_ = std::move(*info);
+  sink->depth_camera_ = rig.depth->own->camera;
   return sink;
 }
 
@@ -66,10 +71,11 @@ Result<void> Ros2ImageSink::take(const StereoFrame& frame) {
     note(publish_if_heard(to.image, [&](std::string& out) { append_image(out, t, to.frame, image.get()); }));
     note(publish_if_heard(to.info, [&](std::string& out) { append_camera_info(out, t, to.frame, to.camera); }));
   }
-  if (depth_ && frame.depth && stamps_.known(frame.t))
-    note(publish_if_heard(*depth_, [&](std::string& out) {
-      append_depth_image(out, stamps_.of(frame.t), Ros2Sink::camera_frame(0), *frame.depth);
-    }));
+  if (!depth_ || !frame.depth || !stamps_.known(frame.t)) return done;
+  const Time t = stamps_.of(frame.t);
+  const std::string of = depth_info_ ? std::string(Ros2Sink::kDepthOptical) : Ros2Sink::camera_frame(0);
+  note(publish_if_heard(*depth_, [&](std::string& out) { append_depth_image(out, t, of, *frame.depth); }));
+  if (depth_info_) note(publish_if_heard(*depth_info_, [&](std::string& out) { append_camera_info(out, t, of, depth_camera_); }));
   return done;
 }
 

@@ -41,7 +41,9 @@ class Ros2ImageSink final : public Sink {
   Ros2Stamps stamps_;
   Ros2Publisher landmarks_;
   std::vector<CameraTopics> cameras_;
-  std::optional<Ros2Publisher> depth_;  ///< of a rig with a depth sensor
+  std::optional<Ros2Publisher> depth_;       ///< of a rig with a depth sensor
+  std::optional<Ros2Publisher> depth_info_;  ///< of one that lies elsewhere
+  Camera depth_camera_;
 };
 
 }  // namespace fbvins

@@ -93,6 +93,8 @@ Result<void> Ros2Sink::publish_fixed(const StereoRig& rig) {
     const auto T_BC = rig.T_BC(c);
     transforms.push_back({options_.imu_frame, names[static_cast<std::size_t>(c)], T_BC.q, T_BC.p});
   }
+  if (const auto& depth = rig.depth; depth && depth->own)
+    transforms.push_back({options_.imu_frame, kDepthOptical, depth->own->T_BC.q, depth->own->T_BC.p});
   std::string message;
   append_transforms(message, Time{}, transforms);
   return fixed_.publish(std::move(message));

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/live/live_options.hpp"
@@ -26,6 +27,8 @@ class Ros2Sink final : public Sink {
 
   /// The name of a camera's frame: z ahead, x right.
   static std::string camera_frame(int camera);
+  /// Of a depth sensor that lies elsewhere than camera 0.
+  static constexpr std::string_view kDepthOptical = "depth_optical";
 
   std::string_view name() const override { return "ROS 2"; }
   Result<void> take(const LiveEvent& event) override;

@@ -56,9 +56,9 @@ Result<Ros2Topics> parse_ros2_topics(const std::string& text) {
 
 Result<std::unique_ptr<Ros2Source>> Ros2Source::open(std::shared_ptr<Ros2Node> node, const Ros2Topics& topics,
                                                      const SourceOptions& options) {
-  Result<StereoRig> rig = rig_for_source(options, "ROS 2 topics", static_cast<int>(topics.cameras.size()));
+  Result<StereoRig> rig = topics.depth.empty() ? rig_for_source(options, "ROS 2 topics", static_cast<int>(topics.cameras.size()))
+                                               : depth_rig_for_source(options, "ROS 2 topics");
   if (!rig) return rig.error();
-  if (!topics.depth.empty()) rig = with_depth(*rig, DepthSensor{});
   return std::unique_ptr<Ros2Source>(new Ros2Source(std::move(node), topics, options, *std::move(rig)));
 }
 
@@ -118,8 +118,9 @@ void Ros2Source::take_depth(std::string_view bytes, SensorInput& input) {
   if (!message) return say_once(fmt::format("{}: a message that is no image was left out", topics_.depth));
   if (!message->is_depth())
     return say_once(fmt::format("{}: depth images are {}; only 16UC1 is supported", topics_.depth, message->encoding));
-  if (!is_of(*message, topics_.depth, rig_.left)) return;
-  auto depth = std::make_shared<DepthImage>(DepthImage{rig_.left.width(), rig_.left.height(), {}});
+  const Camera& camera = rig_.depth_camera();
+  if (!is_of(*message, topics_.depth, camera)) return;
+  auto depth = std::make_shared<DepthImage>(DepthImage{camera.width(), camera.height(), {}});
   depth->mm.resize(std::size_t{message->width} * message->height);
   for (std::size_t y = 0; y < message->height; ++y)
     std::memcpy(depth->mm.data() + y * message->width, message->pixels.data() + y * message->step,

@@ -91,6 +91,15 @@ TEST(Ros2Source, TopicsAreThoseOfTheCalibration) {
   const auto depth = Ros2Source::open(node(), *parse_ros2_topics("/a,/imu,depth=/d"), one.options());
   ASSERT_TRUE(depth) << depth.error().message;
   EXPECT_TRUE((*depth)->rig().depth);
+  EXPECT_FALSE((*depth)->rig().depth->own);
+  const CameraFile of_both(2);
+  const auto elsewhere = Ros2Source::open(node(), *parse_ros2_topics("/a,/imu,depth=/d"), of_both.options());
+  ASSERT_TRUE(elsewhere) << elsewhere.error().message;
+  EXPECT_EQ((*elsewhere)->rig().camera_count(), 1);
+  ASSERT_TRUE((*elsewhere)->rig().depth->own) << "the second camera is the depth sensor's";
+  EXPECT_GT(((*elsewhere)->rig().depth->own->T_BC.p - (*elsewhere)->rig().T_BC0.p).norm(), 0.01);
+  const CameraFile three(3);
+  EXPECT_FALSE(Ros2Source::open(node(), *parse_ros2_topics("/a,/imu,depth=/d"), three.options()));
 }
 
 TEST(Ros2Source, WithoutACalibrationItSaysWhatItWants) {

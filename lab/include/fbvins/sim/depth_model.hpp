@@ -24,6 +24,7 @@ struct DepthModelOptions {
   double hole_share = 0.01;
   double nearest_m = 0.2;
   double farthest_m = 8;
+  double apart_m = 0;
 
   template <class V>
   void visit(V&& v) {
@@ -35,6 +36,9 @@ struct DepthModelOptions {
     v("hole_share", hole_share, "", "share of the image without depth, in patches", 0.0, 1.0);
     v("nearest_m", nearest_m, "m", "nearest distance", 0.01, 100.0);
     v("farthest_m", farthest_m, "m", "farthest distance", 0.02, 65.0);
+    v("apart_m", apart_m, "m",
+      "distance to the right of the camera, slightly turned and with a lens of its own of 640 x 480 pixels; 0: registered to the camera",
+      0.0, 0.5);
   }
 };
 

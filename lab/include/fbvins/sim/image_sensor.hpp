@@ -37,7 +37,9 @@ struct CameraModelOptions {
   double stamp_jitter_us = 20;
   double drop_share = 0;
   double time_offset_ms = 0;
+  double later_ms = 0;
   int legs = 0;
+  int propellers = 0;
 
   template <class V>
   void visit(V&& v) {
@@ -64,7 +66,10 @@ struct CameraModelOptions {
     v("stamp_jitter_us", stamp_jitter_us, "us", "jitter of the right image's stamp, standard deviation", 0.0, 2000.0);
     v("drop_share", drop_share, "", "share of stereo frames that are lost", 0.0, 0.9);
     v("time_offset_ms", time_offset_ms, "ms", "IMU stamp less image stamp of the same instant", -100.0, 100.0);
+    v("later_ms", later_ms, "ms",
+      "each camera but the first takes its images this much later than the one before it, with the same stamps", 0.0, 10.0);
     v("legs", legs, "", "legs of the vehicle in the view of each camera, at the same pixels in every image", 0, 6);
+    v("propellers", propellers, "", "turning propellers in the view of each camera, in its upper corners", 0, 2);
   }
 };
 

@@ -73,7 +73,7 @@ struct SimulationOptions {
 
 /// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
 /// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs), rgbd (one camera and a depth sensor), fisheye and
-/// back-to-back (two lenses of 200 degrees) and legs (of the vehicle, in view).
+/// back-to-back (two lenses of 200 degrees), legs and propellers (of the vehicle, in view).
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 
