@@ -28,6 +28,8 @@ constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDe
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
 /// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
 constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
+/// A new M is levelled anew where it leans by more than this, and by more than so many standard deviations of the vertical.
+constexpr double kLeaning_rad = 0.25 * kDegree, kLeaningSigmas = 3;
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
 
@@ -98,7 +100,8 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
               .begun = true,
               .reset_counter = keyframe.reset_counter,
               .began_map = map_.empty(),
-              .q_LG = keyframe.gauge.q_LG};
+              .q_LG = keyframe.gauge.q_LG,
+              .q_LG_newest = keyframe.gauge.q_LG};
   drift_.restart();
   motion_.forget();
   relocaliser_.forget();
@@ -108,23 +111,35 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
   if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
 }
 
-/// Gravity has become better known. Where the flight began the map, M is aligned with it as a whole, which changes no
-/// relative pose; where anchors hold it, the body stays where it is. Where the flight has joined an older one, M is
-/// gravity-aligned already, and the flight's own keyframes are rotated.
-void LoopCloser::level(const Quat& q_LG) {
-  const Quat turned = q_LG * session_.q_LG.conjugate();
+/// Takes the newest estimate of gravity. Verticals follow it at once; M, where the flight began it, once it leans enough.
+std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
+  if (angle_between(gauge.q_LG, session_.q_LG_newest) != 0) map_.level(session_.number, gauge.q_LG);
+  session_.q_LG_newest = gauge.q_LG;
+  const bool may_lean = session_.began_map && map_.anchors.empty() && options_.degrees_of_freedom == 4;
+  const double leaning = std::max(kLeaning_rad, kLeaningSigmas * gauge.up_sigma_rad);
+  if (may_lean && angle_between(gauge.q_LG, session_.q_LG) <= leaning) return std::nullopt;
+  return level_by_newest();
+}
+
+/// Where the flight began the map, M is turned as a whole, which changes no relative pose; where anchors hold it, the body stays
+/// where it is. Where the flight has joined an older one, M is gravity-aligned already, and the flight's own keyframes are
+/// rotated. Returns how M moved, unless anchors hold it.
+std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
+  const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
+  if (angle_between(turned, Quat::Identity()) == 0) return std::nullopt;
   const Quat turned_in_M = frame_.yaw() * turned * frame_.yaw().conjugate();
-  session_.q_LG = q_LG;
-  if (angle_between(turned, Quat::Identity()) == 0) return;
-  map_.level(session_.number, q_LG);
+  session_.q_LG = session_.q_LG_newest;
+  std::optional<Pose<M, M>> moved;
   if (session_.began_map && !map_.empty()) {
-    if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
-    else frame_.turn(map_.turn(turned, map_.keyframes()[0].T_MB.p));
+    const Pose<M, M> T = map_.turn(turned_in_M, map_.anchored ? frame_.T_MG() * session_.T_GB->p : map_.keyframes()[0].T_MB.p);
+    frame_.turn(T);
+    if (!map_.anchored) moved = T;
   } else {
     for (auto k = map_.keyframes().rbegin(); k != map_.keyframes().rend() && k->session == session_.number; ++k)
       k->T_MB.q = (turned_in_M * k->T_MB.q).normalized();
   }
-  frame_.level(q_LG);
+  frame_.level(session_.q_LG);
+  return moved;
 }
 
 /// Path, drift and readings up to a keyframe.
@@ -150,11 +165,15 @@ MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
 }
 
 MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
-  if (!session_.begun || keyframe.reset_counter != session_.reset_counter) begin_session(keyframe);
-  level(keyframe.gauge.q_LG);
+  MapUpdate update;
+  if (session_.begun && keyframe.reset_counter == session_.reset_counter) {
+    update.M_moved = level(keyframe.gauge);
+  } else {
+    update.M_moved = level_by_newest();  // of the session that ends
+    begin_session(keyframe);
+  }
   session_.up_sigma_rad = keyframe.gauge.up_sigma_rad;
   map_.gravity_mps2 = keyframe.imu.gravity_mps2;
-  MapUpdate update;
   update.frame = keyframe.id;
   update.t = keyframe.t;
   update.reset_counter = keyframe.reset_counter;
@@ -330,6 +349,7 @@ void LoopCloser::optimise(MapUpdate& update) {
 }
 
 PoseGraphReport LoopCloser::finish() {
+  level_by_newest();
   const PoseGraphReport report = map_.optimise({options_.degrees_of_freedom});
   upkeep();
   return report;
