@@ -113,7 +113,7 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
 
 /// Takes the newest estimate of gravity. Verticals follow it at once; M, where the flight began it, once it leans enough.
 std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
-  if (angle_between(gauge.q_LG, session_.q_LG_newest) != 0) map_.level(session_.number, gauge.q_LG);
+  if (gauge.q_LG.coeffs() != session_.q_LG_newest.coeffs()) map_.level(session_.number, gauge.q_LG);
   session_.q_LG_newest = gauge.q_LG;
   const bool may_lean = session_.began_map && map_.anchors.empty() && options_.degrees_of_freedom == 4;
   const double leaning = std::max(kLeaning_rad, kLeaningSigmas * gauge.up_sigma_rad);
@@ -125,13 +125,14 @@ std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
 /// where it is. Where the flight has joined an older one, M is gravity-aligned already, and the flight's own keyframes are
 /// rotated. Returns how M moved, unless anchors hold it.
 std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
+  if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs()) return std::nullopt;
   const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
-  if (angle_between(turned, Quat::Identity()) == 0) return std::nullopt;
   const Quat turned_in_M = frame_.yaw() * turned * frame_.yaw().conjugate();
   session_.q_LG = session_.q_LG_newest;
   std::optional<Pose<M, M>> moved;
   if (session_.began_map && !map_.empty()) {
-    const Pose<M, M> T = map_.turn(turned_in_M, map_.anchored ? frame_.T_MG() * session_.T_GB->p : map_.keyframes()[0].T_MB.p);
+    const Pose<M, M> T =
+        map_.anchored ? map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p) : map_.turn(turned, map_.keyframes()[0].T_MB.p);
     frame_.turn(T);
     if (!map_.anchored) moved = T;
   } else {

@@ -10,6 +10,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/imu/preintegration.hpp"
+#include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
 
