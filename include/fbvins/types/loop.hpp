@@ -52,7 +52,8 @@ struct MapUpdate {
   Pose<M, W> T_MW_smooth;  ///< follows T_MW at a bounded speed: for a controller
   bool anchored = false;   ///< M is the frame of the building
   /// M is another frame from this update on: takes coordinates in the M of before to those in the new one. A new map is levelled
-  /// so, once or twice in its first seconds, and T_MW_smooth goes there at its speed; where M becomes the building's, it jumps.
+  /// so, once or twice in its first seconds, and T_MW_smooth, which follows the newest vertical all the time, does not step;
+  /// where M becomes the building's, T_MW_smooth jumps with it.
   std::optional<Pose<M, M>> M_moved = {};
   std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this refers to
   std::uint32_t map_session = 0;    ///< counts the odometry frames W that were joined to this map

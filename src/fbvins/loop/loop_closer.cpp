@@ -121,6 +121,14 @@ std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
   return level_by_newest();
 }
 
+/// From a new M to where it will be once it is levelled: about its first keyframe, which defines it.
+Pose<M, M> LoopCloser::to_upright() const {
+  if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs() || map_.empty()) return {};
+  const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
+  const Vec3& first = map_.keyframes()[0].T_MB.p;
+  return {turned, Vec3(first - turned * first)};
+}
+
 /// Where the flight began the map, M is turned as a whole, which changes no relative pose; where anchors hold it, the body stays
 /// where it is. Where the flight has joined an older one, M is gravity-aligned already, and the flight's own keyframes are
 /// rotated. Returns how M moved, unless anchors hold it.
@@ -128,13 +136,12 @@ std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
   if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs()) return std::nullopt;
   const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
   const Quat turned_in_M = frame_.yaw() * turned * frame_.yaw().conjugate();
+  const Pose<M, M> upright = to_upright();
   session_.q_LG = session_.q_LG_newest;
   std::optional<Pose<M, M>> moved;
   if (session_.began_map && !map_.empty()) {
-    const Pose<M, M> T =
-        map_.anchored ? map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p) : map_.turn(turned, map_.keyframes()[0].T_MB.p);
-    frame_.turn(T);
-    if (!map_.anchored) moved = T;
+    if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
+    else map_.move(upright), frame_.turn(upright), moved = upright;
   } else {
     for (auto k = map_.keyframes().rbegin(); k != map_.keyframes().rend() && k->session == session_.number; ++k)
       k->T_MB.q = (turned_in_M * k->T_MB.q).normalized();
@@ -191,7 +198,7 @@ void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   if (!update.localised) return;
   update.T_MG = frame_.T_MG();
   update.T_MW = update.T_MG * keyframe.T_WG.inverse();
-  update.T_MW_smooth = follower_.follow(update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
+  update.T_MW_smooth = follower_.follow(to_upright() * update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
 }
 
 MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {

@@ -91,6 +91,7 @@ class LoopCloser final : public Mapper {
   void end_update(const Keyframe& keyframe, MapUpdate& update);
   void begin_session(const Keyframe& keyframe);
   std::optional<Pose<M, M>> level(const GaugeState& gauge);
+  Pose<M, M> to_upright() const;
   std::optional<Pose<M, M>> level_by_newest();
   void advance(const Keyframe& keyframe);
   MapKeyframe query_of(Place place, const Keyframe& keyframe);

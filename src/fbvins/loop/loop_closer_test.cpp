@@ -100,6 +100,7 @@ TEST(LoopCloser, ANewMapStaysWhereItIsUntilItLeansForCertainAndSaysHowItMoved) {
   LoopCloser closer(rig(), {}, vocabulary());
   int moves = 0;
   Trajectory<M> in_M;
+  Pose<M, W> smooth;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Keyframe k = leaning(FrameId{static_cast<std::int64_t>(i)}, frames[i], std::min(1.0, static_cast<double>(i) / 60));
     const MapUpdate u = closer.process(frames[i].place, k);
@@ -108,6 +109,9 @@ TEST(LoopCloser, ANewMapStaysWhereItIsUntilItLeansForCertainAndSaysHowItMoved) {
       for (StampedPose<M>& p : in_M) p.T = *u.M_moved * p.T;
     }
     in_M.push_back({k.t, u.T_MG * k.gauge.T_GB});
+    const Vec3 body_W = k.T_WG * k.gauge.T_GB.p;
+    if (i > 0) EXPECT_LT((u.T_MW_smooth * body_W - smooth * body_W).norm(), 0.0301) << "0.15 m/s for 0.2 s, also where M moves";
+    smooth = u.T_MW_smooth;
     const double leans = angle_between(u.T_MG.q * k.gauge.q_LG.conjugate(), about_z(yaw_of(u.T_MG.q)));
     EXPECT_LT(leans, std::max(0.25 * kDegree, 3 * k.gauge.up_sigma_rad) + 1e-4) << i;
   }
