@@ -14,8 +14,9 @@
 namespace fbvins {
 namespace {
 
-/// Standard deviation of the difference between the map's and the odometry's roll and pitch.
-constexpr double kTiltSigma_rad = 0.005;
+/// Standard deviation of the difference between the map's and the odometry's roll and pitch. Factor on the covariance by which a
+/// recognised place corrects M: those that follow one another share the map's error.
+constexpr double kTiltSigma_rad = 0.005, kSharedError = 4;
 /// A new map begins as the gauge of its first flight, aligned with gravity.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
 /// Prior of T_MG at relocalisation, before the recognised pose is applied as a measurement.
@@ -125,7 +126,7 @@ std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
 Pose<M, M> LoopCloser::to_upright() const {
   if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs() || map_.empty()) return {};
   const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
-  const Vec3& first = map_.keyframes()[0].T_MB.p;
+  const Vec3 first = map_.keyframes()[0].T_MB.p;
   return {turned, Vec3(first - turned * first)};
 }
 
@@ -134,9 +135,8 @@ Pose<M, M> LoopCloser::to_upright() const {
 /// rotated. Returns how M moved, unless anchors hold it.
 std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
   if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs()) return std::nullopt;
-  const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
-  const Quat turned_in_M = frame_.yaw() * turned * frame_.yaw().conjugate();
   const Pose<M, M> upright = to_upright();
+  const Quat turned_in_M = frame_.yaw() * upright.q * frame_.yaw().conjugate();
   session_.q_LG = session_.q_LG_newest;
   std::optional<Pose<M, M>> moved;
   if (session_.began_map && !map_.empty()) {
@@ -257,6 +257,7 @@ bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
+  seen.covariance *= kSharedError;
   frame_.update(seen);
   return true;
 }
