@@ -15,7 +15,7 @@ namespace fbvins {
 namespace {
 
 /// Standard deviation of the difference between the map's and the odometry's roll and pitch. Factor on the covariance by which a
-/// recognised place corrects M: those that follow one another share the map's error.
+/// place of the flight itself corrects M: those that follow one another share the error with which it was mapped.
 constexpr double kTiltSigma_rad = 0.005, kSharedError = 4;
 /// A new map begins as the gauge of its first flight, aligned with gravity.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
@@ -257,7 +257,7 @@ bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
-  seen.covariance *= kSharedError;
+  if (k.session == session_.number) seen.covariance *= kSharedError;
   frame_.update(seen);
   return true;
 }
