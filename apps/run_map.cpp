@@ -27,7 +27,7 @@ Result<void> check_folder_of(const std::string& path) {
 }
 
 /// T_MB of every frame that has a pose, with the update that was known when the frame came.
-/// Where M becomes another frame, the poses begin anew.
+/// Where M becomes the building's frame, the poses begin anew; where it is levelled, those of before are turned with it.
 /// Before the first update a new map begins where the odometry began, and is level; in an old one the flight has to be localised.
 void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   MapUpdate begin;
@@ -37,7 +37,9 @@ void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   for (const Odometry& o : run.odometry) {
     for (; next != record.updates.end() && next->applies_from <= o.id; ++next) {
       now = &*next;
-      if (now->M_moved) record.causal.clear(), record.bounded.clear();
+      if (!now->M_moved) continue;
+      if (now->anchored) record.causal.clear(), record.bounded.clear();
+      for (StampedPose<M>& p : record.causal) p.T = *now->M_moved * p.T;
     }
     if (now == &begin) {
       begin.reset_counter = o.reset_counter;

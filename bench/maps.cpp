@@ -225,6 +225,8 @@ void lost(const Arguments& a, const Vocabulary& vocabulary) {
   system.on_map_update([&](const MapUpdate& u) {
     known = u;
     if (u.found && on_again) found_s.push_back((u.t - *on_again).seconds());
+    if (u.M_moved)
+      for (StampedPose<M>& p : first) p.T = *u.M_moved * p.T;
   });
   system.on_odometry([&](const Odometry& o) {
     if (!o.health.has_pose() || !known || !known->localised || known->reset_counter != o.reset_counter) return;

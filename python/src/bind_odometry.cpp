@@ -127,7 +127,8 @@ void bind_pose(nb::module_& m) {
 }
 
 void bind_map_update(nb::module_& m) {
-  nb::class_<MapUpdate>(m, "MapUpdate", "Result of loop closure after a keyframe: T_MB = T_MW T_WB. M is gravity-aligned.")
+  nb::class_<MapUpdate>(m, "MapUpdate",
+                        "Result of loop closure after a keyframe: T_MB = T_MW T_WB. M is gravity-aligned, see M_moved.")
       .def_prop_ro(
           "t", [](const MapUpdate& u) { return u.t.ns; }, "ns, of the keyframe")
       .def_prop_ro("frame", [](const MapUpdate& u) { return u.frame.value; })
@@ -144,7 +145,8 @@ void bind_map_update(nb::module_& m) {
       .def_ro("anchored", &MapUpdate::anchored, "M is the frame of the building, by anchors")
       .def_prop_ro(
           "M_moved", [](const MapUpdate& u) { return u.M_moved ? nb::cast(to_array(*u.M_moved)) : nb::object(nb::none()); },
-          "None, or (4, 4) where M is another frame from this update on: takes coordinates in the M of before to the new one")
+          "None, or (4, 4) where M is another frame from this update on, levelled or the building's: takes coordinates in the M "
+          "of before to the new one")
       .def_prop_ro(
           "anchors", [](const MapUpdate& u) { return u.stats.anchors; }, "anchors that moved M")
       .def_prop_ro("anchors_refused", [](const MapUpdate& u) { return u.stats.anchors_refused; })

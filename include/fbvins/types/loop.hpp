@@ -47,11 +47,13 @@ struct MapUpdate {
   Time t;
   bool localised = false;  ///< false: where W is in M is not known (a loaded map, or after a restart)
   bool found = false;      ///< from this update on it is known again: after a restart, or for the first time in a loaded map
-  Pose<M, G> T_MG;         ///< best estimate; jumps when a place is recognised. M is level
+  Pose<M, G> T_MG;         ///< best estimate; jumps when a place is recognised
   Pose<M, W> T_MW;         ///< the same for W as it was published when the keyframe was handed on
   Pose<M, W> T_MW_smooth;  ///< follows T_MW at a bounded speed: for a controller
   bool anchored = false;   ///< M is the frame of the building
-  /// M is another frame from this update on, T_MW_smooth as well: takes coordinates in the M of before to those in the new one.
+  /// M is another frame from this update on: takes coordinates in the M of before to those in the new one. A new map is levelled
+  /// so, once or twice in its first seconds, and T_MW_smooth, which follows the newest vertical all the time, does not step;
+  /// where M becomes the building's, T_MW_smooth jumps with it.
   std::optional<Pose<M, M>> M_moved = {};
   std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this refers to
   std::uint32_t map_session = 0;    ///< counts the odometry frames W that were joined to this map

@@ -40,7 +40,7 @@ PlaceMap FlightJoin::without(PlaceMap kept, const std::set<std::uint32_t>& sessi
     if (same_M) k->T_MB = old.T_MB;
   }
   const bool some_joined = std::ranges::any_of(kept.keyframes(), [&](const MapKeyframe& k) { return is_of_flight(k.session); });
-  if (some_joined) kept.optimise({});
+  if (some_joined) kept.optimise({}, same_M ? first_session_ : 0);
   return kept;
 }
 

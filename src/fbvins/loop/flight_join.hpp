@@ -31,7 +31,8 @@ class FlightJoin {
 
   /// Sessions of the flight that have a place in M but do not join, and why.
   std::map<std::uint32_t, std::string> objections(const PlaceMap& map) const;
-  /// The map as it was loaded, and the other sessions of the flight.
+  /// The map as it was loaded, and the other sessions of the flight, optimised about it: that costs nothing for the size of the
+  /// map.
   PlaceMap without(PlaceMap map, const std::set<std::uint32_t>& sessions) const;
 
  private:

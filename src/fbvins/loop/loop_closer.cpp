@@ -14,8 +14,9 @@
 namespace fbvins {
 namespace {
 
-/// Standard deviation of the difference between the map's and the odometry's roll and pitch.
-constexpr double kTiltSigma_rad = 0.005;
+/// Standard deviation of the difference between the map's and the odometry's roll and pitch. Factor on the covariance by which a
+/// place of the flight itself corrects M: those that follow one another share the error with which it was mapped.
+constexpr double kTiltSigma_rad = 0.005, kSharedError = 4;
 /// A new map begins as the gauge of its first flight, aligned with gravity.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
 /// Prior of T_MG at relocalisation, before the recognised pose is applied as a measurement.
@@ -28,6 +29,8 @@ constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDe
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
 /// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
 constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
+/// A new M is levelled anew where it leans by more than this, and by more than so many standard deviations of the vertical.
+constexpr double kLeaning_rad = 0.25 * kDegree, kLeaningSigmas = 3;
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
 
@@ -98,7 +101,8 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
               .begun = true,
               .reset_counter = keyframe.reset_counter,
               .began_map = map_.empty(),
-              .q_LG = keyframe.gauge.q_LG};
+              .q_LG = keyframe.gauge.q_LG,
+              .q_LG_newest = keyframe.gauge.q_LG};
   drift_.restart();
   motion_.forget();
   relocaliser_.forget();
@@ -108,23 +112,42 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
   if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
 }
 
-/// Gravity has become better known. Where the flight began the map, M is aligned with it as a whole, which changes no
-/// relative pose; where anchors hold it, the body stays where it is. Where the flight has joined an older one, M is
-/// gravity-aligned already, and the flight's own keyframes are rotated.
-void LoopCloser::level(const Quat& q_LG) {
-  const Quat turned = q_LG * session_.q_LG.conjugate();
-  const Quat turned_in_M = frame_.yaw() * turned * frame_.yaw().conjugate();
-  session_.q_LG = q_LG;
-  if (angle_between(turned, Quat::Identity()) == 0) return;
-  map_.level(session_.number, q_LG);
+/// Takes the newest estimate of gravity. Verticals follow it at once; M, where the flight began it, once it leans enough.
+std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
+  if (gauge.q_LG.coeffs() != session_.q_LG_newest.coeffs()) map_.level(session_.number, gauge.q_LG);
+  session_.q_LG_newest = gauge.q_LG;
+  const bool may_lean = session_.began_map && map_.anchors.empty() && options_.degrees_of_freedom == 4;
+  const double leaning = std::max(kLeaning_rad, kLeaningSigmas * gauge.up_sigma_rad);
+  if (may_lean && angle_between(gauge.q_LG, session_.q_LG) <= leaning) return std::nullopt;
+  return level_by_newest();
+}
+
+/// From a new M to where it will be once it is levelled: about its first keyframe, which defines it.
+Pose<M, M> LoopCloser::to_upright() const {
+  if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs() || map_.empty()) return {};
+  const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
+  const Vec3 first = map_.keyframes()[0].T_MB.p;
+  return {turned, Vec3(first - turned * first)};
+}
+
+/// Where the flight began the map, M is turned as a whole, which changes no relative pose; where anchors hold it, the body stays
+/// where it is. Where the flight has joined an older one, M is gravity-aligned already, and the flight's own keyframes are
+/// rotated. Returns how M moved, unless anchors hold it.
+std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
+  if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs()) return std::nullopt;
+  const Pose<M, M> upright = to_upright();
+  const Quat turned_in_M = frame_.yaw() * upright.q * frame_.yaw().conjugate();
+  session_.q_LG = session_.q_LG_newest;
+  std::optional<Pose<M, M>> moved;
   if (session_.began_map && !map_.empty()) {
     if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
-    else frame_.turn(map_.turn(turned, map_.keyframes()[0].T_MB.p));
+    else map_.move(upright), frame_.turn(upright), moved = upright;
   } else {
     for (auto k = map_.keyframes().rbegin(); k != map_.keyframes().rend() && k->session == session_.number; ++k)
       k->T_MB.q = (turned_in_M * k->T_MB.q).normalized();
   }
-  frame_.level(q_LG);
+  frame_.level(session_.q_LG);
+  return moved;
 }
 
 /// Path, drift and readings up to a keyframe.
@@ -150,11 +173,15 @@ MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
 }
 
 MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
-  if (!session_.begun || keyframe.reset_counter != session_.reset_counter) begin_session(keyframe);
-  level(keyframe.gauge.q_LG);
+  MapUpdate update;
+  if (session_.begun && keyframe.reset_counter == session_.reset_counter) {
+    update.M_moved = level(keyframe.gauge);
+  } else {
+    update.M_moved = level_by_newest();  // of the session that ends
+    begin_session(keyframe);
+  }
   session_.up_sigma_rad = keyframe.gauge.up_sigma_rad;
   map_.gravity_mps2 = keyframe.imu.gravity_mps2;
-  MapUpdate update;
   update.frame = keyframe.id;
   update.t = keyframe.t;
   update.reset_counter = keyframe.reset_counter;
@@ -171,7 +198,7 @@ void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   if (!update.localised) return;
   update.T_MG = frame_.T_MG();
   update.T_MW = update.T_MG * keyframe.T_WG.inverse();
-  update.T_MW_smooth = follower_.follow(update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
+  update.T_MW_smooth = follower_.follow(to_upright() * update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
 }
 
 MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
@@ -230,6 +257,7 @@ bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
+  if (k.session == session_.number) seen.covariance *= kSharedError;
   frame_.update(seen);
   return true;
 }
@@ -330,6 +358,7 @@ void LoopCloser::optimise(MapUpdate& update) {
 }
 
 PoseGraphReport LoopCloser::finish() {
+  level_by_newest();
   const PoseGraphReport report = map_.optimise({options_.degrees_of_freedom});
   upkeep();
   return report;

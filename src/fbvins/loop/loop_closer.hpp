@@ -71,7 +71,8 @@ class LoopCloser final : public Mapper {
     std::uint32_t reset_counter = 0;
     bool began_map = false;  ///< M is its gauge, aligned with gravity
     bool localised = false;
-    Quat q_LG = Quat::Identity();
+    Quat q_LG = Quat::Identity();  ///< by which M, or the flight in an older one, is level
+    Quat q_LG_newest = Quat::Identity();
     double up_sigma_rad = 0;
     KeyframeId newest = {};
     std::optional<Pose<G, B>> T_GB = {};  ///< of the last keyframe that was handed in
@@ -89,7 +90,9 @@ class LoopCloser final : public Mapper {
   MapUpdate begin_update(const Keyframe& keyframe);
   void end_update(const Keyframe& keyframe, MapUpdate& update);
   void begin_session(const Keyframe& keyframe);
-  void level(const Quat& q_LG);
+  std::optional<Pose<M, M>> level(const GaugeState& gauge);
+  Pose<M, M> to_upright() const;
+  std::optional<Pose<M, M>> level_by_newest();
   void advance(const Keyframe& keyframe);
   MapKeyframe query_of(Place place, const Keyframe& keyframe);
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);

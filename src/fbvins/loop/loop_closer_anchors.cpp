@@ -103,7 +103,7 @@ void LoopCloser::find_building(MapUpdate& update) {
     map_.anchored = true;
     frame_.reset(T * frame_.T_MG(), sigma_m, sigma_rad);
     follower_.forget();
-    update.M_moved = T;
+    update.M_moved = update.M_moved ? T * *update.M_moved : T;
   } else {
     frame_.reset({fit->q_AX * session_.q_LG, fit->p_AX}, sigma_m, sigma_rad);
     join_session(frame_.T_MG());

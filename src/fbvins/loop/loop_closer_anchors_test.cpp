@@ -28,6 +28,34 @@ TEST(AnchoredMap, WithoutEnoughMStaysWhereTheFlightBegan) {
   }
 }
 
+TEST(AnchoredMap, WhatWasKeptInMComesIntoTheBuildingWithItAlsoWhereMWasNotLevel) {
+  const auto frames = flight(room(1), 60, 0, 0, 2);
+  const Quat q_GL = so3_exp(Vec3(0.04, -0.03, 0));
+  LoopCloser closer(rig(), {}, vocabulary());
+  Rng rng(5);
+  Pose<M, B> kept;
+  int moves = 0;
+  bool anchored = false;
+  for (std::size_t i = 0; i < frames.size() && !anchored; ++i) {
+    const Frame& f = frames[i];
+    Keyframe k = keyframe(FrameId{static_cast<std::int64_t>(i)}, f.t, {q_GL * f.odometry.q, q_GL * f.odometry.p});
+    k.gauge.q_LG = so3_exp(std::min(1.0, static_cast<double>(i) / 50) * so3_log(q_GL.conjugate()));
+    k.gauge.up_sigma_rad = i < 10 ? 0.02 : 0.0;
+    if (i >= 10) k.anchors = {position(f, rng, 0.005)};
+    const MapUpdate u = closer.process(f.place, k);
+    if (u.M_moved) kept = *u.M_moved * kept, ++moves;
+    if (i == 5) kept = u.T_MG * k.gauge.T_GB;
+    EXPECT_EQ(u.M_moved.has_value(), i >= 10) << "with anchors M is levelled at once";
+    anchored = u.anchored;
+    if (!anchored) continue;
+    const Pose<M, B> now = u.T_MG * k.gauge.T_GB;
+    EXPECT_LT((now.p - truth_of(f).p).norm(), 0.1);
+    EXPECT_LT((kept.p - truth_of(frames[5]).p).norm(), 0.1);
+  }
+  EXPECT_TRUE(anchored);
+  EXPECT_GT(moves, 1);
+}
+
 TEST(AnchoredMap, HeightsHoldOneThatPositionsAnchored) {
   auto frames = flight(room(1), 250, 0, 0, 2);
   for (std::size_t i = 0; i < frames.size(); ++i) {

@@ -10,6 +10,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/imu/preintegration.hpp"
+#include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
 
@@ -83,6 +84,58 @@ TEST(LoopCloser, BetterKnownGravityTurnsTheWholeMapAndBendsNothing) {
     EXPECT_LT((b[i].T_MB.p - in_M[i].T.p).norm(), 1e-9);
   }
   EXPECT_LT(std::sqrt(sum / static_cast<double>(a.size())), 0.003);
+}
+
+/// A keyframe of a gauge that leans by 0.05 rad, of which `known` (0 to 1) is known, as well as the estimator says.
+Keyframe leaning(FrameId id, const Frame& f, double known, std::uint32_t reset_counter = 0) {
+  const Quat q_GL = so3_exp(Vec3(0.04, -0.03, 0));
+  Keyframe k = keyframe(id, f.t, {q_GL * f.odometry.q, q_GL * f.odometry.p}, reset_counter);
+  k.gauge.q_LG = so3_exp(known * so3_log(q_GL.conjugate()));
+  k.gauge.up_sigma_rad = 0.02 * (1 - known) + 0.0015;
+  return k;
+}
+
+TEST(LoopCloser, ANewMapStaysWhereItIsUntilItLeansForCertainAndSaysHowItMoved) {
+  const auto frames = flight(room(1), 80, 0, 0, 3);
+  LoopCloser closer(rig(), {}, vocabulary());
+  int moves = 0;
+  Trajectory<M> in_M;
+  Pose<M, W> smooth;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Keyframe k = leaning(FrameId{static_cast<std::int64_t>(i)}, frames[i], std::min(1.0, static_cast<double>(i) / 60));
+    const MapUpdate u = closer.process(frames[i].place, k);
+    if (u.M_moved) {
+      ++moves;
+      for (StampedPose<M>& p : in_M) p.T = *u.M_moved * p.T;
+    }
+    in_M.push_back({k.t, u.T_MG * k.gauge.T_GB});
+    const Vec3 body_W = k.T_WG * k.gauge.T_GB.p;
+    const Vec3 step = u.T_MW_smooth * body_W - (i > 0 ? smooth : u.T_MW_smooth) * body_W;
+    EXPECT_LT(step.norm(), 0.0301) << "0.15 m/s for 0.2 s, also where M moves";
+    smooth = u.T_MW_smooth;
+    const double leans = angle_between(u.T_MG.q * k.gauge.q_LG.conjugate(), about_z(yaw_of(u.T_MG.q)));
+    EXPECT_LT(leans, std::max(0.25 * kDegree, 3 * k.gauge.up_sigma_rad) + 1e-4) << i;
+  }
+  EXPECT_EQ(moves, 3);
+  const Pose<M, G> T = in_M.back().T * frames.back().truth.inverse();
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    EXPECT_LT((T * frames[i].truth.p - in_M[i].T.p).norm(), 0.015) << "a tilt of 0.05 rad would be 0.1 m";
+  closer.finish();
+  const Pose<M, B>& first = closer.map().keyframes()[0].T_MB;
+  EXPECT_LT((first.q * frames[0].truth.q.conjugate() * Vec3::UnitZ() - Vec3::UnitZ()).norm(), 1e-4) << "level in the end";
+}
+
+TEST(LoopCloser, ARestartLeavesANewMapAsLevelAsIsKnown) {
+  const auto frames = flight(room(1), 22, 0, 0, 3);
+  LoopCloser closer(rig(), {}, vocabulary());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const bool again = i == 21;
+    const Keyframe k =
+        leaning(FrameId{static_cast<std::int64_t>(i)}, frames[i], again ? 0.0 : static_cast<double>(i) / 60, again);
+    EXPECT_EQ(closer.process(frames[i].place, k).M_moved.has_value(), again) << i;
+  }
+  const Quat q_ML = closer.map().keyframes()[0].T_MB.q * frames[0].truth.q.conjugate();
+  EXPECT_NEAR(angle_between(q_ML, about_z(yaw_of(q_ML))), 0.05 * (1 - 20.0 / 60), 1e-4);
 }
 
 TEST(LoopCloser, ALaterFlightsGaugeIsItsOwn) {

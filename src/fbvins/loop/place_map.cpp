@@ -200,19 +200,21 @@ MapSession& PlaceMap::session(std::uint32_t number, Time t) {
   return at != sessions.end() && at->number == number ? *at : *sessions.insert(at, {number, t, t});
 }
 
-PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
+PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options, std::uint32_t first) {
   if (keyframes_.empty()) return {};
   PoseGraph graph;
-  const std::vector<bool> joined = in_graph();
+  std::vector<bool> moves = in_graph();
+  const auto may_move = [&](KeyframeId id) { return moves[static_cast<std::size_t>(index_of(id))]; };
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) moves[i] = moves[i] && keyframes_[i].session >= first;
   for (std::size_t i = 0; i < keyframes_.size(); ++i)
-    graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, !joined[i] || (i == 0 && !anchored));
+    graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, !moves[i] || (i == 0 && !anchored));
   for (const MapEdge& e : edges)
-    if (joined[static_cast<std::size_t>(index_of(e.from))]) graph.add_edge(edge_of(e));
+    if (may_move(e.from) || may_move(e.to)) graph.add_edge(edge_of(e));
   if (anchored) {
     for (const MapAnchor& a : anchors)
-      if (joined[static_cast<std::size_t>(index_of(a.keyframe))]) graph.add_anchor({index_of(a.keyframe), a.measured});
+      if (may_move(a.keyframe)) graph.add_anchor({index_of(a.keyframe), a.measured});
     for (std::size_t i = 0; i < keyframes_.size(); ++i)
-      if (joined[i] && (i == 0 || keyframes_[i].session != keyframes_[i - 1].session))
+      if (moves[i] && (i == 0 || keyframes_[i].session != keyframes_[i - 1].session))
         graph.add_anchor({static_cast<int>(i), about_here(keyframes_[i].T_MB), true});
   }
   const PoseGraphReport report = graph.optimise(options);

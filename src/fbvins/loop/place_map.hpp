@@ -123,8 +123,9 @@ class PlaceMap {
   /// A map that is longer flown in keeps every second of its older anchors, so that their number stays bounded.
   void add_anchor(MapAnchor anchor);
 
-  /// Optimises the keyframes that edges connect to the first one or, in an anchored map, to one with an anchor.
-  PoseGraphReport optimise(const PoseGraphOptions& options);
+  /// Optimises the keyframes that edges connect to the first one or, in an anchored map, to one with an anchor. Those of
+  /// sessions before `first` stay where they are, and cost nothing.
+  PoseGraphReport optimise(const PoseGraphOptions& options, std::uint32_t first = 0);
   /// Of each edge at the present poses: squared residual in standard deviations, six of them.
   std::vector<double> chi2_of_edges(const PoseGraphOptions& options) const;
 

@@ -66,7 +66,7 @@ MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEve
     EXPECT_GT(u.applies_from, u.frame);
     EXPECT_GE(u.applies_from.value, newest_update);
     newest_update = u.applies_from.value;
-    outcome.moved += u.M_moved.has_value();
+    outcome.moved += u.M_moved && u.anchored;  // else it is levelled
   });
   std::size_t next = 0;
   for (const SensorEvent& event : events) {
