@@ -182,6 +182,8 @@ def check_displays(root):
     def panels(node):
         return {node} if isinstance(node, str) else panels(node["first"]) | panels(node["second"])
     require(panels(layout["layout"]) == set(layout["configById"]), "fbvins.json: panels and their settings")
+    missing = {"globalVariables", "playbackConfig", "userNodes"} - set(layout)
+    require(not missing and layout["playbackConfig"]["speed"] == 1, f"fbvins.json lacks {missing}, without which a recording cannot be played")
 
 
 def main():
