@@ -3,6 +3,9 @@
 
 #include <dds/dds.h>
 #include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
@@ -23,13 +26,33 @@ constexpr const char* kGraphType = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 /// Which security policy a participant has: ROS's default.
 constexpr std::string_view kEnclave = "enclave=/;";
 
-// This machine alone; peers are contacted one by one, as the loopback has no multicast.
-constexpr const char* kLoopback =
-    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>"
+// This machine alone: peers are contacted one by one at 127.0.0.1, without multicast. ROS 2 Humble's nodes have the loopback as
+// their only interface then; those since Iron have the network's, and neither kind takes addresses of the other's: so there are
+// both.
+constexpr const char* kThisMachine =
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/>{}</Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
     "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
+constexpr const char* kNetworkAsWell = "<NetworkInterface autodetermine=\"true\"/>";
 constexpr const char* kOneInterface =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"/></Interfaces></General></Domain></CycloneDDS>";
+
+/// Whether CycloneDDS would find another interface than the loopback, which may not be named twice.
+bool has_network() {
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return false;
+  bool found = false;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next)
+    found |= one->ifa_addr != nullptr && one->ifa_addr->sa_family == AF_INET && (one->ifa_flags & IFF_UP) != 0 &&
+             (one->ifa_flags & IFF_LOOPBACK) == 0;
+  freeifaddrs(all);
+  return found;
+}
+
+std::string configuration_of(const Ros2Address& address, bool humble) {
+  if (!address.interface.empty()) return fmt::format(fmt::runtime(kOneInterface), address.interface);
+  return fmt::format(fmt::runtime(kThisMachine), !humble && has_network() ? kNetworkAsWell : "");
+}
 
 Result<TopicOfBytes> make_topic(const Ros2Node& node, const std::string& topic, const std::string& type) {
   if (topic.empty() || topic[0] != '/')
@@ -93,8 +116,7 @@ DdsEntity::~DdsEntity() {
 
 Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, const Ros2Name& name, bool humble,
                                                  const Ros2QualityWishes& wishes) {
-  const std::string configuration =
-      address.interface.empty() ? kLoopback : fmt::format(fmt::runtime(kOneInterface), address.interface);
+  const std::string configuration = configuration_of(address, humble);
   auto node = std::make_shared<Ros2Node>();
   const std::string where =
       fmt::format("ROS 2 domain {}{}{}", address.domain, address.interface.empty() ? "" : " on ", address.interface);
