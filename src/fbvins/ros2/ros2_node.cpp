@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <ifaddrs.h>
 #include <net/if.h>
+#include <netdb.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -26,32 +28,37 @@ constexpr const char* kGraphType = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 /// Which security policy a participant has: ROS's default.
 constexpr std::string_view kEnclave = "enclave=/;";
 
-// This machine alone: peers are contacted one by one at 127.0.0.1, without multicast. ROS 2 Humble's nodes have the loopback as
-// their only interface then; those since Iron have the network's, and neither kind takes addresses of the other's: so there are
-// both.
+// This machine alone: peers are contacted one by one at its own addresses, without multicast. ROS 2 Humble's nodes have the
+// loopback as their only interface then; those since Iron have the network's, and neither kind takes addresses of the other's: so
+// there are both.
 constexpr const char* kThisMachine =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/>{}</Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
+    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/>{}</Peers></Discovery></Domain></CycloneDDS>";
 constexpr const char* kNetworkAsWell = "<NetworkInterface autodetermine=\"true\"/>";
 constexpr const char* kOneInterface =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"/></Interfaces></General></Domain></CycloneDDS>";
 
-/// Whether CycloneDDS would find another interface than the loopback, which may not be named twice.
-bool has_network() {
+/// This machine's addresses in networks, as peers. Without one CycloneDDS finds the loopback alone, which may not be named twice.
+std::string own_addresses() {
   ifaddrs* all = nullptr;
-  if (getifaddrs(&all) != 0) return false;
-  bool found = false;
-  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next)
-    found |= one->ifa_addr != nullptr && one->ifa_addr->sa_family == AF_INET && (one->ifa_flags & IFF_UP) != 0 &&
-             (one->ifa_flags & IFF_LOOPBACK) == 0;
+  if (getifaddrs(&all) != 0) return {};
+  std::string peers;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    if ((one->ifa_flags & IFF_UP) == 0 || (one->ifa_flags & IFF_LOOPBACK) != 0) continue;
+    char text[NI_MAXHOST] = {};
+    if (getnameinfo(one->ifa_addr, sizeof(sockaddr_in), text, sizeof text, nullptr, 0, NI_NUMERICHOST) == 0)
+      peers += fmt::format("<Peer address=\"{}\"/>", text);
+  }
   freeifaddrs(all);
-  return found;
+  return peers;
 }
 
 std::string configuration_of(const Ros2Address& address, bool humble) {
   if (!address.interface.empty()) return fmt::format(fmt::runtime(kOneInterface), address.interface);
-  return fmt::format(fmt::runtime(kThisMachine), !humble && has_network() ? kNetworkAsWell : "");
+  const std::string peers = humble ? "" : own_addresses();
+  return fmt::format(fmt::runtime(kThisMachine), peers.empty() ? "" : kNetworkAsWell, peers);
 }
 
 Result<TopicOfBytes> make_topic(const Ros2Node& node, const std::string& topic, const std::string& type) {
