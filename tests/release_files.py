@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""packaging/site/versions.py, and packaging/apt_repository and packaging/bill_of_materials.py on two small packages: apt itself takes what is in the repository, and
+"""What `./dev release` refuses before it builds; packaging/site/versions.py, and packaging/apt_repository and packaging/bill_of_materials.py on two small packages: apt itself takes what is in the repository, and
 nothing that was altered; PyPI's spdx-tools reads the bill, where they are installed.
 
 usage: release_files.py [PYTHON]     exit 77 (skipped) without GnuPG, apt-utils or dpkg-dev
@@ -8,6 +8,7 @@ usage: release_files.py [PYTHON]     exit 77 (skipped) without GnuPG, apt-utils 
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -126,6 +127,22 @@ def check_site_versions(folder):
     require("url=0.10.0/index.html" in (site / "index.html").read_text(encoding="utf-8"), "the site's first page leads to the newest release")
 
 
+def check_release(folder):
+    """A release that could not be signed is refused at once, not after an hour of building."""
+    if not (REPOSITORY / ".git").exists():
+        return print("./dev release: not tried, as this is no clone")
+    clone = folder / "clone"
+    run("git", "clone", "--quiet", "--shared", "--no-tags", REPOSITORY, clone)
+    tag = "v" + re.search(r'^version = "(.*)"', (clone / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    more = {"cwd": clone, "env": {**os.environ, "FBVINS_RELEASE_KEY": "nobody@localhost"}}
+    require(f"the tag {tag} is not" in run("./dev", "release", ok=False, **more).stderr, "a release without its tag")
+    run("git", "tag", tag, cwd=clone)
+    done = run("./dev", "release", ok=False, **more)
+    require(done.returncode == 2 and "no secret key nobody@localhost" in done.stderr, f"a release by a key that is not there: {done.stderr}")
+    require(not (clone / "out").exists(), "something was made")
+    return None
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -135,6 +152,7 @@ def main():
         check_bill(folder, packages)
         check_repository(folder, packages)
         check_site_versions(folder)
+        check_release(folder)
     return 0
 
 

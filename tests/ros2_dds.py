@@ -12,9 +12,9 @@ from cyclonedds.idl import IdlStruct, types
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 DOMAIN = 100 + os.getpid() % 100
-LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast>"
-            "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>")
+# As nodes of ROS 2 Iron and later are limited to their machine: on the network's interface, where there is one, without multicast.
+LOOPBACK = ("<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+            "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address='localhost'/></Peers></Discovery></Domain></CycloneDDS>")
 # Type of the service, and the fields of its request and its reply.
 EMPTY = "uint8 structure_needs_at_least_one_member"
 TRIGGER = ("std_srvs/srv/Trigger", EMPTY, "bool success\nstring message")

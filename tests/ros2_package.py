@@ -146,6 +146,9 @@ def check_package(root):
     require(package.findtext("version") == version, f"package.xml has version {package.findtext('version')}, FBVINS {version}")
     build = (root / "ros2/CMakeLists.txt").read_text(encoding="utf-8")
     require(f"project({package.findtext('name')} " in build, "CMakeLists.txt: the package's name")
+    require("set(CMAKE_BUILD_TYPE Release)" in build, "CMakeLists.txt: without a build type colcon compiles Eigen's templates, which the libraries share, without optimisation")
+    first = json.loads((root / "ros2/colcon.pkg").read_text(encoding="utf-8"))["build-dependencies"]
+    require(first == [re.search(r"^project\((\w+) ", (root / "CMakeLists.txt").read_text(encoding="utf-8"), re.MULTILINE)[1]], f"colcon.pkg: {first}, and not what colcon finds at the repository's root")
     for folder in re.search(r"install\(DIRECTORY ([a-z ]+) DESTINATION", build)[1].split():
         require(any((root / "ros2" / folder).iterdir()), f"ros2/{folder} is empty")
     try:
@@ -182,6 +185,8 @@ def check_displays(root):
     def panels(node):
         return {node} if isinstance(node, str) else panels(node["first"]) | panels(node["second"])
     require(panels(layout["layout"]) == set(layout["configById"]), "fbvins.json: panels and their settings")
+    missing = {"globalVariables", "playbackConfig", "userNodes"} - set(layout)
+    require(not missing and layout["playbackConfig"]["speed"] == 1, f"fbvins.json lacks {missing}, without which a recording cannot be played")
 
 
 def main():

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* glibc 2.29 gave these functions a second version, without an error handler that C++ does not use. The first one computes the same,
    and is in glibc 2.28, too. */
-#ifndef FBVINS_WHEEL_SYMBOLS_H
+#if !defined(FBVINS_WHEEL_SYMBOLS_H) && !defined(__ASSEMBLER__)
 #define FBVINS_WHEEL_SYMBOLS_H
 #ifdef __aarch64__
 #define FIRST "GLIBC_2.17"

@@ -47,7 +47,8 @@ constexpr TypeHash kTypeHashes[] = {
     {"lifecycle_msgs/srv/ChangeState_Request", "d74c6f524e14cade7b67e7297190360ed749264af300524fc1456f27cc2a553a"},
     {"lifecycle_msgs/srv/ChangeState_Response", "e1ddfed0271fefe63767aa71561926e4d9eac0f1ddf9e71a8873eb46b36deac2"},
     {"lifecycle_msgs/srv/GetAvailableTransitions_Request", "52a73c0b5d7489bee0df6ddb0aec45c41289d223ff225b58fe11d859ac8109a6"},
-    {"lifecycle_msgs/srv/GetAvailableTransitions_Response", "4711339461aadf02bcfff797a198de911f885074bd3f2fe9f7b677ef87f0741c"}};
+    {"lifecycle_msgs/srv/GetAvailableTransitions_Response", "4711339461aadf02bcfff797a198de911f885074bd3f2fe9f7b677ef87f0741c"},
+    {"rmw_dds_common/msg/ParticipantEntitiesInfo", "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}};
 
 }  // namespace
 

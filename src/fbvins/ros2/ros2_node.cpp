@@ -3,6 +3,11 @@
 
 #include <dds/dds.h>
 #include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
@@ -23,13 +28,38 @@ constexpr const char* kGraphType = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 /// Which security policy a participant has: ROS's default.
 constexpr std::string_view kEnclave = "enclave=/;";
 
-// This machine alone; peers are contacted one by one, as the loopback has no multicast.
-constexpr const char* kLoopback =
-    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>"
+// This machine alone: peers are contacted one by one at its own addresses, without multicast. ROS 2 Humble's nodes have the
+// loopback as their only interface then; those since Iron have the network's, and neither kind takes addresses of the other's: so
+// there are both.
+constexpr const char* kThisMachine =
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/>{}</Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
+    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/>{}</Peers></Discovery></Domain></CycloneDDS>";
+constexpr const char* kNetworkAsWell = "<NetworkInterface autodetermine=\"true\"/>";
 constexpr const char* kOneInterface =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"/></Interfaces></General></Domain></CycloneDDS>";
+
+/// This machine's addresses in networks, as peers. Without one CycloneDDS finds the loopback alone, which may not be named twice.
+std::string own_addresses() {
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return {};
+  std::string peers;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    if ((one->ifa_flags & IFF_UP) == 0 || (one->ifa_flags & IFF_LOOPBACK) != 0) continue;
+    char text[NI_MAXHOST] = {};
+    if (getnameinfo(one->ifa_addr, sizeof(sockaddr_in), text, sizeof text, nullptr, 0, NI_NUMERICHOST) == 0)
+      peers += fmt::format("<Peer address=\"{}\"/>", text);
+  }
+  freeifaddrs(all);
+  return peers;
+}
+
+std::string configuration_of(const Ros2Address& address, bool humble) {
+  if (!address.interface.empty()) return fmt::format(fmt::runtime(kOneInterface), address.interface);
+  const std::string peers = humble ? "" : own_addresses();
+  return fmt::format(fmt::runtime(kThisMachine), peers.empty() ? "" : kNetworkAsWell, peers);
+}
 
 Result<TopicOfBytes> make_topic(const Ros2Node& node, const std::string& topic, const std::string& type) {
   if (topic.empty() || topic[0] != '/')
@@ -93,8 +123,7 @@ DdsEntity::~DdsEntity() {
 
 Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, const Ros2Name& name, bool humble,
                                                  const Ros2QualityWishes& wishes) {
-  const std::string configuration =
-      address.interface.empty() ? kLoopback : fmt::format(fmt::runtime(kOneInterface), address.interface);
+  const std::string configuration = configuration_of(address, humble);
   auto node = std::make_shared<Ros2Node>();
   const std::string where =
       fmt::format("ROS 2 domain {}{}{}", address.domain, address.interface.empty() ? "" : " on ", address.interface);

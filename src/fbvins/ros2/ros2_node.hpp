@@ -30,7 +30,7 @@ namespace fbvins {
 /// Domain and network interface.
 struct Ros2Address {
   std::uint32_t domain = 0;    ///< ROS_DOMAIN_ID
-  std::string interface = {};  ///< of the network; empty: this machine alone (loopback)
+  std::string interface = {};  ///< of the network; empty: this machine alone
 };
 /// DOMAIN[:INTERFACE], as in "0" or "42:eth0".
 Result<Ros2Address> parse_ros2_address(const std::string& text);
