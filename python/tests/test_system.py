@@ -370,7 +370,7 @@ def test_a_camera_with_a_depth_sensor():
     elsewhere = fbvins.Rig(own.left, T_BC0=own.T_BC0, depth=fbvins.DepthSensor(camera=small, T_BD=T_BD))
     assert sensor.camera is None and sensor.T_BD is None
     assert elsewhere.depth.camera.width == 320 and np.allclose(pickle.loads(pickle.dumps(elsewhere)).depth.T_BD, T_BD)
-    fbvins.System(None, elsewhere).push_images(0, None, depth=np.zeros((240, 320), np.uint16))
+    fbvins.System(None, elsewhere).push_images(0, np.zeros((480, 752), np.uint8), depth=np.zeros((240, 320), np.uint16))
     with pytest.raises(ValueError, match="depth: a NumPy array of uint16"):
         fbvins.System(None, elsewhere).push_images(0, None, depth=np.zeros((480, 752), np.uint16))
     with pytest.raises(ValueError, match="camera and T_BD go together"):
