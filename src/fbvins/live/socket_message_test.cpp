@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/socket_message.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,7 +58,8 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.6 of the protocol, this program 1.6");
+  EXPECT_EQ(message.error().message, fmt::format("the sender speaks version 7.{} of the protocol, this program {}.{}",
+                                                 FBVINS_SOCKET_MINOR, FBVINS_SOCKET_MAJOR, FBVINS_SOCKET_MINOR));
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/socket_source.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <condition_variable>
@@ -225,7 +226,10 @@ TEST_F(SocketSourceTest, WrongHellosAreRefusedWithTheReason) {
   const FileDescriptor memory = test::test_memory();
   FbvinsSocketHello hello = hello_message(nullptr);
   hello.major = 2;
-  EXPECT_EQ(refusal(hello, memory), "the sender speaks version 2.6 of the protocol, this program 1.6");
+  const std::string other_version =
+      fmt::format("the sender speaks version {}.{} of the protocol, this program {}.{}", FBVINS_SOCKET_MAJOR + 1,
+                  FBVINS_SOCKET_MINOR, FBVINS_SOCKET_MAJOR, FBVINS_SOCKET_MINOR);
+  EXPECT_EQ(refusal(hello, memory), other_version);
   EXPECT_EQ(refusal(hello_message(nullptr), test::test_memory(test::kSlots * test::kSlotBytes, F_SEAL_GROW)),
             "the images' memory is not sealed with F_SEAL_SHRINK");
   EXPECT_EQ(refusal(hello_message(nullptr), FileDescriptor()), "hello: 0 file descriptors instead of one");
@@ -234,7 +238,7 @@ TEST_F(SocketSourceTest, WrongHellosAreRefusedWithTheReason) {
   hello = hello_message(nullptr);
   hello.width_px = 60;
   EXPECT_EQ(refusal(hello, memory), "images of 60 x 48 pixels, the calibration is for 64 x 48");
-  EXPECT_TRUE(inbox_.hears("a sender: the sender speaks version 2.5"));
+  EXPECT_TRUE(inbox_.hears("a sender: " + other_version));
   expect_service();
 }
 
