@@ -11,7 +11,7 @@ namespace propellers_test {
 constexpr int kWidth = 376, kHeight = 240;
 constexpr std::size_t kPixels = std::size_t{kWidth} * kHeight;
 
-std::vector<float> drawn(double t_s, double exposure_s, double line_delay_s = 0) {
+std::vector<float> rendered(double t_s, double exposure_s, double line_delay_s = 0) {
   std::vector<float> radiance(kPixels, 0.4f);
   Propellers(kWidth, kHeight, 2, 0).draw(radiance, t_s, exposure_s, line_delay_s);
   return radiance;
@@ -23,7 +23,7 @@ int darkened(const std::vector<float>& radiance) {
 
 TEST(Propellers, AreInTheUpperCornersAlone) {
   const Image reach = Propellers(kWidth, kHeight, 2, 0).reach();
-  const std::vector<float> radiance = drawn(1.23, 0.02);
+  const std::vector<float> radiance = rendered(1.23, 0.02);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       if (reach.at(x, y) != 0) {
@@ -36,11 +36,11 @@ TEST(Propellers, AreInTheUpperCornersAlone) {
 }
 
 TEST(Propellers, BladesTurnBetweenImages) {
-  const std::vector<float> one = drawn(1, 1e-4);
+  const std::vector<float> one = rendered(1, 1e-4);
   ASSERT_GT(darkened(one), 0);
   int seen = 0, alike = 0;
   for (int image = 1; image <= 20; ++image) {
-    const std::vector<float> other = drawn(1 + 0.05 * image, 1e-4);
+    const std::vector<float> other = rendered(1 + 0.05 * image, 1e-4);
     int both = 0;
     for (std::size_t i = 0; i < kPixels; ++i) both += one[i] < 0.1f && other[i] < 0.1f;
     seen += darkened(other) > 0;
@@ -52,13 +52,13 @@ TEST(Propellers, BladesTurnBetweenImages) {
 
 TEST(Propellers, AnExposureOfHalfATurnBlursThemOverAllTheirReach) {
   const Image reach = Propellers(kWidth, kHeight, 2, 0).reach();
-  const std::vector<float> sharp = drawn(1, 1e-5), blurred = drawn(1, 0.02);
+  const std::vector<float> sharp = rendered(1, 1e-5), blurred = rendered(1, 0.02);
   EXPECT_LT(4 * darkened(sharp), darkened(blurred));
   EXPECT_LT(*std::min_element(sharp.begin(), sharp.end()), 0.05f) << "black";
   EXPECT_GT(*std::min_element(blurred.begin(), blurred.end()), 0.05f) << "a shade";
 }
 
-TEST(Propellers, ARollingShutterBendsThem) { EXPECT_NE(drawn(1, 1e-4, 4e-5), drawn(1, 1e-4)); }
+TEST(Propellers, ARollingShutterBendsThem) { EXPECT_NE(rendered(1, 1e-4, 4e-5), rendered(1, 1e-4)); }
 
 }  // namespace propellers_test
 }  // namespace fbvins

@@ -12,19 +12,7 @@
 namespace fbvins {
 namespace realsense_depth_test {
 
-constexpr std::int64_t kMs = 1'000'000;
-constexpr std::chrono::seconds kPatience{20};
-constexpr Time kStart{1'700'000'000'000 * kMs};
-
-StereoRig rig() {
-  StereoRig rig;
-  rig.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
-  rig.right = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
-  rig.T_BC0 = {Quat::Identity(), Vec3(0.00552, -0.0051, -0.01174)};
-  rig.T_BC1 = {Quat::Identity(), Vec3(0.00552 + 0.05, -0.0051, -0.01174)};
-  rig.image_rate_hz = 30;
-  return rig;
-}
+using namespace test;
 
 /// In the place of the right images; values are tenths of a millimetre there, and the sensor's noise follows from the baseline.
 TEST(RealsenseDepth, DepthImagesComeWithTheLeftOnes) {

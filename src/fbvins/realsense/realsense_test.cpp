@@ -21,19 +21,7 @@
 namespace fbvins {
 namespace realsense_test {
 
-constexpr std::int64_t kMs = 1'000'000;
-constexpr std::chrono::seconds kPatience{20};
-constexpr Time kStart{1'700'000'000'000 * kMs};
-
-StereoRig rig() {
-  StereoRig rig;
-  rig.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
-  rig.right = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
-  rig.T_BC0 = {Quat::Identity(), Vec3(0.00552, -0.0051, -0.01174)};
-  rig.T_BC1 = {Quat::Identity(), Vec3(0.00552 + 0.05, -0.0051, -0.01174)};
-  rig.image_rate_hz = 30;
-  return rig;
-}
+using namespace test;
 
 /// Plays camera and IMU for this many images, whose grey values are their numbers; right ones have later stamps by `right_late`.
 void play(SoftwareCamera& camera, int images, Time start = kStart, Duration right_late = {}) {

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
+#include <cstdint>
 #include <librealsense2/rs.hpp>
 // after rs.hpp, which it builds on
 #include <librealsense2/hpp/rs_internal.hpp>
@@ -12,6 +14,24 @@
 #include "fbvins/types/sensor_event.hpp"
 
 namespace fbvins {
+namespace test {
+
+inline constexpr std::int64_t kMs = 1'000'000;
+inline constexpr std::chrono::seconds kPatience{20};
+inline constexpr Time kStart{1'700'000'000'000 * kMs};
+
+/// A D435i by its factory calibration: the infrared cameras and the IMU.
+inline StereoRig rig() {
+  StereoRig rig;
+  rig.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
+  rig.right = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
+  rig.T_BC0 = {Quat::Identity(), Vec3(0.00552, -0.0051, -0.01174)};
+  rig.T_BC1 = {Quat::Identity(), Vec3(0.00552 + 0.05, -0.0051, -0.01174)};
+  rig.image_rate_hz = 30;
+  return rig;
+}
+
+}  // namespace test
 
 class SoftwareCamera {
  public:
