@@ -7,6 +7,28 @@
 
 namespace fbvins {
 
+namespace {
+
+/// At most `limit` landmarks, those seen by most frames; the older ones among equals. The order stays.
+void keep_most_observed(std::vector<const Landmark*>& landmarks, int limit) {
+  int spare = limit - static_cast<int>(landmarks.size());
+  if (spare >= 0) return;
+  std::vector<int> seen_by;  // number of landmarks with so many observations
+  for (const Landmark* l : landmarks) {
+    if (seen_by.size() <= l->observations.size()) seen_by.resize(l->observations.size() + 1);
+    ++seen_by[l->observations.size()];
+  }
+  std::size_t least = 0;  // observations: those with fewer leave
+  while (spare < 0) spare += seen_by[least++];
+  // Of those with the fewest that are left out the oldest fill up what is spare.
+  std::erase_if(landmarks, [&](const Landmark* l) {
+    const std::size_t n = l->observations.size();
+    return n < least && (n + 1 < least || spare-- <= 0);
+  });
+}
+
+}  // namespace
+
 SlidingWindow::SlidingWindow(const EstimatorOptions& options, const WindowWeights& weights)
     : options_(options), weights_(weights), known_(options.known_landmarks) {}
 
@@ -75,16 +97,10 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
   out.observations.clear();
   out.landmark_priors.clear();
 
-  // If there are too many, those seen by most frames; the older ones among equals.
   std::vector<const Landmark*> chosen;
   for (const Landmark& l : landmarks_.all())
     if (l.triangulated && l.observations.size() >= 2) chosen.push_back(&l);
-  if (static_cast<int>(chosen.size()) > options_.max_landmarks) {
-    std::stable_sort(chosen.begin(), chosen.end(),
-                     [](const Landmark* a, const Landmark* b) { return a->observations.size() > b->observations.size(); });
-    chosen.resize(static_cast<std::size_t>(options_.max_landmarks));
-    std::sort(chosen.begin(), chosen.end(), [](const Landmark* a, const Landmark* b) { return a->id < b->id; });
-  }
+  keep_most_observed(chosen, options_.max_landmarks);
   for (const Landmark* landmark : chosen) {
     WindowLandmark l;
     l.id = landmark->id;
