@@ -15,11 +15,20 @@ foreach(component ${FBVINS_COMPONENTS})
   target_link_libraries(fbvins_component_${component} INTERFACE ${modules})
   target_link_libraries(fbvins_all INTERFACE fbvins_component_${component})
   set_target_properties(fbvins_component_${component} PROPERTIES EXPORT_NAME ${component})
+  if(FBVINS_EIGEN_HEADER)
+    # A user's sources run the same Eigen and inline code: of two kinds under one name the linker would take either for both.
+    target_compile_options(fbvins_component_${component} INTERFACE -ffp-contract=off
+      "$<BUILD_INTERFACE:SHELL:-include ${FBVINS_EIGEN_HEADER}>"
+      "$<INSTALL_INTERFACE:SHELL:-include $<INSTALL_PREFIX>/${CMAKE_INSTALL_INCLUDEDIR}/fbvins/core/eigen_as_on_x86_64.hpp>")
+  endif()
   install(TARGETS fbvins_component_${component} ${modules} EXPORT fbvins-${component}
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT devel)
   install(EXPORT fbvins-${component} NAMESPACE fbvins:: DESTINATION ${package_folder} FILE fbvins-${component}-targets.cmake COMPONENT devel)
 endforeach()
 
+if(FBVINS_EIGEN_HEADER)
+  install(FILES ${FBVINS_EIGEN_HEADER} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/fbvins/core COMPONENT devel)
+endif()
 install(DIRECTORY include/fbvins DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT devel FILES_MATCHING PATTERN "*.hpp")
 if(FBVINS_BUILD_LAB)
   install(DIRECTORY lab/include/fbvins DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT devel FILES_MATCHING PATTERN "*.hpp")

@@ -34,5 +34,8 @@ set(CPACK_DEBIAN_DEVEL_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVEL_DESCRIPTION "FB-VINS: headers and static libraries
  For programs that call find_package(fbvins COMPONENTS core io loop live sim).")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS "libeigen3-dev, libfmt-dev")
+if(FBVINS_EIGEN_HEADER)
+  string(APPEND CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS ", libsimde-dev")
+endif()
 set(CPACK_DEBIAN_DEVEL_PACKAGE_RECOMMENDS "libceres-dev, libyaml-cpp-dev, libzip-dev, libpng-dev, libturbojpeg0-dev, nettle-dev")
 include(CPack)

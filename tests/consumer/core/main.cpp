@@ -7,6 +7,10 @@
 
 #include "dot_frontend.hpp"
 
+#if __has_include(<fbvins/core/eigen_as_on_x86_64.hpp>) && !defined(EIGEN_VECTORIZE_SSE2)
+#error "the library's Eigen code is not this program's"
+#endif
+
 /// Error of the last pose's distance from the start, m; NaN without a pose.
 double fly(fbvins::SystemParts parts, const char* name) {
   auto system = fbvins::System::create({}, wall::rig(), fbvins::RunMode::threaded, std::move(parts));
