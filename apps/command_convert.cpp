@@ -47,7 +47,7 @@ int convert(const Arguments& arguments) {
       convert_recording(**data, record_of(arguments.recording, **data), arguments.out, [&](int done) { progress.update(done); });
   if (!frames) return fail(frames.error().message);
   warnings.print_at_end((*data)->info());
-  if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", *frames, bold(arguments.out));
+  if (!arguments.quiet) fmt::print("{} frames in {}\n", *frames, bold(arguments.out));
   return kOk;
 }
 

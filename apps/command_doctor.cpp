@@ -143,7 +143,6 @@ int examine_recording(const Arguments& arguments) {
   PlayedRecording recording(arguments.recording);
   if (Result<void> opened = recording.open(); !opened) return fail(opened.error().message);
   const StereoRig rig = recording.rig();
-  if (!rig.has_right()) return fail(fmt::format("{}: has one camera; the doctor judges a pair", arguments.recording.path));
   const Replay replay = [&](const TakeEvent& take) { return recording.play(take); };
   const CalibrationStyle style = arguments.recording.calibration.empty() ? CalibrationStyle::euroc : CalibrationStyle::kalibr;
   const std::vector<ScaledLens> scaled = recording.scaled();

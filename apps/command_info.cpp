@@ -66,7 +66,7 @@ std::string times_of(const StereoRig& rig) {
 void print_text(const Dataset& data) {
   const DatasetInfo& info = data.info();
   fmt::print("{} ({})\n", bold(info.name), info.format);
-  fmt::print("{:<14}{} at {:.2f} Hz over {:.2f} s, longest gap {:.3f} s\n", "stereo frames", info.frames, info.image_rate_hz,
+  fmt::print("{:<14}{} at {:.2f} Hz over {:.2f} s, longest gap {:.3f} s\n", "frames", info.frames, info.image_rate_hz,
              (info.last_image - info.first_image).seconds(), info.longest_image_gap.seconds());
   fmt::print("{:<14}first {} ns, last {} ns\n", "stamps", info.first_image.ns, info.last_image.ns);
   print_camera("left", data.rig().left, info.left);

@@ -84,7 +84,7 @@ int simulate_flight(const Arguments& arguments) {
       return fail(saved.error().message);
   if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
   if (!arguments.quiet)
-    fmt::print("{} stereo frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(),
+    fmt::print("{} frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(),
                bold(arguments.out));
   return kOk;
 }

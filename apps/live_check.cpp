@@ -39,9 +39,6 @@ class CheckedInput final : public SensorInput {
   }
   /// After the source has ended.
   Diagnosis diagnosis(const StereoRig& rig) const {
-    Diagnosis none;
-    none.not_judged = {"the calibration: there is one camera, and the doctor judges a pair"};
-    if (!rig.has_right()) return none;
     const Replay replay = [&](const TakeEvent& take) -> Result<void> {
       for (const SensorEvent& event : events_)
         if (!take(event)) break;

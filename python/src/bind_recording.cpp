@@ -128,7 +128,7 @@ void bind_dataset(nb::module_& m) {
           nb::sig("def __iter__(self) -> Recording"))
       .def("__next__", &next, nb::sig("def __next__(self) -> ImuSample | StereoFrame"))
       .def("__repr__", [](const Dataset& d) {
-        return fmt::format("<fbvins.Recording {} ({}), {} stereo frames>", d.info().name, d.info().format, d.frames().size());
+        return fmt::format("<fbvins.Recording {} ({}), {} frames>", d.info().name, d.info().format, d.frames().size());
       });
 }
 

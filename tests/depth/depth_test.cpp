@@ -8,6 +8,8 @@
 
 #include "fbvins/config/config.hpp"
 #include "fbvins/core/rng.hpp"
+#include "fbvins/doctor/diagnose.hpp"
+#include "fbvins/doctor/doctor.hpp"
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/pipeline/system.hpp"
 #include "fbvins/sim/simulation.hpp"
@@ -98,6 +100,23 @@ TEST_P(DepthFlight, IsGoodFromItsStartOn) {
   const Flown flown = fly(GetParam(), false, true);
   expect_good_from_its_start_on(flown);
   EXPECT_LT(flown.ate_m(), 0.015);
+}
+
+/// The doctor measures rotations with the sensor's depths.
+TEST(DepthDoctor, FindsATimeOffset) {
+  const Replay replay = [&](const TakeEvent& take) {
+    for (const SensorEvent& event : recorded().events)
+      if (!take(event)) break;
+    return Result<void>{};
+  };
+  StereoRig rig = recorded().rig;
+  rig.time_offset_s += 0.02;
+  const auto late = diagnose(rig, replay, CalibrationStyle::euroc);
+  ASSERT_TRUE(late);
+  ASSERT_EQ(late->findings.size(), 1u) << to_text(*late, true);
+  EXPECT_EQ(late->findings[0].kind, FindingKind::time_offset);
+  EXPECT_NEAR(late->findings[0].size, -20, 2);
+  EXPECT_TRUE(late->findings[0].corrected.starts_with("cam0/sensor.yaml: timeshift_cam_imu: ")) << "there is no cam1";
 }
 
 /// One camera alone cannot start at rest: the depths that it starts by are the sensor's, 5 cm away and of other pixels.

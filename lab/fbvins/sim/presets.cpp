@@ -85,6 +85,7 @@ constexpr Preset kPresets[] = {
        o.flight.extent_z_m = 2.5;
        o.flight.max_speed_mps = 1.5;
      }},
+    {"mono", [](SimulationOptions& o) { o.rig = "mono"; }},
     {"quad", [](SimulationOptions& o) { o.rig = "quad"; }},
     {"rgbd", [](SimulationOptions& o) { o.rig = "rgbd"; }},
     {"fisheye", [](SimulationOptions& o) { o.rig = "fisheye"; }},

@@ -112,6 +112,7 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
     if (!loaded) return loaded.error();
     rig = *loaded;
   }
+  if (o.rig == "mono") rig = with_one_camera(rig);
   if (o.rig == "fisheye") put_lens(rig, fisheye());
   if (o.rig == "back-to-back") {
     rig = with_one_camera(rig);

@@ -127,6 +127,17 @@ TEST(Simulation, CamerasMayTakeTheirImagesLaterThanTheirStampsSay) {
   EXPECT_FALSE(std::equal(later.right->row(0), later.right->row(480), on_time.right->row(0)));
 }
 
+TEST(Simulation, OneCameraSeesWhatTheLeftOneOfAPairSees) {
+  const auto frame = [](const char* rig) {
+    SimulationOptions options = short_flight("normal");
+    options.rig = rig;
+    return render_frame(*prepare_simulation(options), 4).frame;
+  };
+  const StereoFrame one = frame("mono"), pair = frame("stereo");
+  EXPECT_EQ(one.right, nullptr);
+  EXPECT_TRUE(std::equal(one.left->row(0), one.left->row(480), pair.left->row(0)));
+}
+
 TEST(Simulation, ADepthSensorThatLiesElsewhereMeasuresTheSameRoom) {
   SimulationOptions options = short_flight("rgbd");
   options.depth.apart_m = 0.06;

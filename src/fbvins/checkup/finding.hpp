@@ -76,6 +76,7 @@ enum class CalibrationField {
   mask_of_left,
   mask_of_right,
   time_offset,
+  line_delay,
   imu_rate,
   imu_noise,
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <functional>
 #include <set>
 
 #include "fbvins/camera/lens_numbers.hpp"
@@ -58,13 +59,25 @@ std::string mask_line(bool left, CalibrationStyle style) {
   return fmt::format("{}mask: mask{}.png", file_of(left, style), left ? 0 : 1);
 }
 
-std::string time_lines(const StereoRig& rig, CalibrationStyle style) {
-  const double first_s = rig.times(0).time_offset_s, second_s = rig.has_right() ? rig.times(1).time_offset_s : first_s;
+/// Of each camera what the two have not in common.
+std::string camera_lines(const StereoRig& rig, CalibrationStyle style,
+                         const std::function<std::string(const CameraTimes&)>& entry) {
+  const std::string first = entry(rig.times(0)), second = rig.has_right() ? entry(rig.times(1)) : first;
   const char* file = style == CalibrationStyle::euroc ? "/sensor.yaml" : "";
-  if (second_s != first_s)
-    return fmt::format("cam0{0}: timeshift_cam_imu: {1:.5f}\ncam1{0}: timeshift_cam_imu: {2:.5f}", file, first_s, second_s);
+  if (second != first) return fmt::format("cam0{0}: {1}\ncam1{0}: {2}", file, first, second);
   const std::string cameras = rig.has_right() ? fmt::format("cam0{0}, cam1{0}", file) : fmt::format("cam0{}", file);
-  return fmt::format("{}: timeshift_cam_imu: {:.5f}", cameras, first_s);
+  return fmt::format("{}: {}", cameras, first);
+}
+
+std::string time_lines(const StereoRig& rig, CalibrationStyle style) {
+  return camera_lines(rig, style, [](const CameraTimes& t) { return fmt::format("timeshift_cam_imu: {:.5f}", t.time_offset_s); });
+}
+
+std::string line_delay_lines(const StereoRig& rig, CalibrationStyle style) {
+  return camera_lines(rig, style, [style](const CameraTimes& t) {
+    return style == CalibrationStyle::euroc ? fmt::format("line_delay_us: {:.2f}", 1e6 * t.line_delay_s)
+                                            : fmt::format("line_delay: {:.3e}", t.line_delay_s);
+  });
 }
 
 std::string rate_line(const ImuNoise& noise, CalibrationStyle style) {
@@ -76,6 +89,12 @@ std::string noise_lines(const ImuNoise& noise, CalibrationStyle style) {
   std::string out = imu_noise_text(noise, imu_file(style), "{:.4g}");
   out.pop_back();  // the last newline
   return out;
+}
+
+bool is_of_right(CalibrationField field) {
+  using enum CalibrationField;
+  return field == mounting_of_right || field == size_of_right || field == lens_of_right || field == distortion_of_right ||
+         field == mask_of_right;
 }
 
 }  // namespace
@@ -93,6 +112,7 @@ std::string line_of(CalibrationField field, const StereoRig& rig, CalibrationSty
     case CalibrationField::mask_of_left: return mask_line(true, style);
     case CalibrationField::mask_of_right: return mask_line(false, style);
     case CalibrationField::time_offset: return time_lines(rig, style);
+    case CalibrationField::line_delay: return line_delay_lines(rig, style);
     case CalibrationField::imu_rate: return rate_line(rig.imu_noise, style);
     case CalibrationField::imu_noise: return noise_lines(rig.imu_noise, style);
   }
@@ -104,7 +124,7 @@ void write_lines(std::span<Finding> findings, const StereoRig& rig, CalibrationS
   for (Finding& finding : findings) {
     finding.corrected.clear();
     for (const CalibrationField field : finding.fields) {
-      if (!written.insert(field).second) continue;
+      if ((!rig.has_right() && is_of_right(field)) || !written.insert(field).second) continue;
       if (!finding.corrected.empty()) finding.corrected += '\n';
       finding.corrected += line_of(field, rig, style);
     }

@@ -87,6 +87,10 @@ Result<CorrectedRig> correct_rig(const StereoRig& rig, const Diagnosis& before, 
         before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be corrected in a calibration";
     return corrected;
   }
+  if (rig.depth) {
+    corrected.why_not = "Kalibr's file has no depth sensor: put the lines into the recording's own calibration";
+    return corrected;
+  }
   if (rig.camera_count() > 2) {
     corrected.why_not = "the doctor judges a pair, and there are more cameras: --camera both takes the first two";
     return corrected;

@@ -27,6 +27,7 @@ double inverse_depth_by(const StereoRig& rig, const Vec2& left_px, const Vec2& r
 }  // namespace
 
 Evidence with_depths_by(const StereoRig& rig, Evidence evidence) {
+  if (!rig.has_right()) return evidence;  // a depth sensor measured them
   for (SeenFrame& frame : evidence.frames)
     for (SeenFeature& feature : frame.features) {
       if (feature.inverse_depth <= 0) continue;

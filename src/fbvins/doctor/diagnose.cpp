@@ -59,11 +59,11 @@ bool explains_better(const Diagnosis& with_it, const Diagnosis& other, int cost_
          cost_of(with_it) + 1 < cost_of_other;
 }
 
-Result<Diagnosis> diagnose_pair(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+Result<Diagnosis> diagnose_group(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
   const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
   if (!evidence) return evidence.error();
   const Diagnosis as_given = examine(*evidence, style);
-  if (!is_strange(as_given)) return as_given;
+  if (!rig.has_right() || !is_strange(as_given)) return as_given;  // common mistakes are told apart by the epipolar error
   Diagnosis best = as_given;
   int least = cost_of(as_given);
   for (const CommonMistake& mistake : common_mistakes(rig)) {
@@ -81,28 +81,25 @@ Result<Diagnosis> diagnose_pair(const StereoRig& rig, const Replay& replay, Cali
   return best;
 }
 
-/// Each pair of the rig.
-Result<Diagnosis> diagnose_pairs(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+/// Each pair of the rig, from which more is known, and then each camera without a partner.
+Result<Diagnosis> diagnose_groups(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
   Diagnosis all;
   all.rig = rig;
   bool first = true;
-  for (const CameraGroup& group : camera_groups(rig)) {
-    if (!group.second) {
-      all.not_judged.push_back(
-          fmt::format("camera {}: by the calibration it overlaps with no other, and the doctor judges pairs", group.first));
-      continue;
-    }
-    const Replay of_pair = [&](const TakeEvent& take) {
+  std::vector<CameraGroup> groups = camera_groups(rig);
+  std::ranges::stable_partition(groups, [](const CameraGroup& group) { return group.second.has_value(); });
+  for (const CameraGroup& group : groups) {
+    const Replay of_group = [&](const TakeEvent& take) {
       return replay([&](SensorEvent event) {
         const auto* frame = std::get_if<StereoFrame>(&event);
         if (frame == nullptr) return take(std::move(event));
-        std::optional<StereoFrame> images = frame_of_pair(*frame, group);
+        std::optional<StereoFrame> images = frame_of_group(*frame, group);
         return !images || take(*std::move(images));
       });
     };
-    const Result<Diagnosis> found = diagnose_pair(rig_of(rig, group), of_pair, style);
+    const Result<Diagnosis> found = diagnose_group(rig_of(rig, group), of_group, style);
     if (!found) return found;
-    add_pair(*found, group, std::exchange(first, false), all);
+    add_group(*found, group, std::exchange(first, false), all);
   }
   return all;
 }
@@ -145,7 +142,7 @@ Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, Calib
 }
 
 Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
-  return rig.camera_count() > 2 ? diagnose_pairs(rig, replay, style) : diagnose_pair(rig, replay, style);
+  return rig.camera_count() > 2 ? diagnose_groups(rig, replay, style) : diagnose_group(rig, replay, style);
 }
 
 }  // namespace fbvins

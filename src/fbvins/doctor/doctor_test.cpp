@@ -144,6 +144,21 @@ TEST(Doctor, MeasuresARollingShutter) {
   const Finding* finding = find(diagnosis, FindingKind::rolling_shutter);
   ASSERT_NE(finding, nullptr) << all_of(diagnosis);
   EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);
+  EXPECT_NEAR(diagnosis.rig.line_delay_s, 0.02 / 480, 0.002 / 480);
+  EXPECT_EQ(finding->corrected,
+            fmt::format("cam0/sensor.yaml, cam1/sensor.yaml: line_delay_us: {:.2f}", 1e6 * diagnosis.rig.line_delay_s));
+}
+
+TEST(Doctor, ComparesARollingShutterWithTheCalibrations) {
+  Evidence evidence = test::SyntheticEvidence({.rolling_s = 0.02}).make();
+  evidence.rig.line_delay_s = evidence.working_rig.line_delay_s = 0.02 / 480;
+  EXPECT_EQ(find(examine(evidence), FindingKind::rolling_shutter), nullptr);
+  evidence.rig.line_delay_s = evidence.working_rig.line_delay_s = 0.01 / 480;
+  const Diagnosis diagnosis = examine(evidence);
+  const Finding* finding = find(diagnosis, FindingKind::rolling_shutter);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_NEAR(finding->size, 10, 2) << all_of(diagnosis);
+  EXPECT_NEAR(diagnosis.rig.line_delay_s, 0.02 / 480, 0.002 / 480);
 }
 
 TEST(Doctor, SaysWhatCannotBeJudged) {

@@ -105,15 +105,14 @@ bool Examination::fixed_in_view(double share_of_features) {
   if (evidence_.views.empty()) return false;
   const FixedInView fixed = find_fixed(evidence_, imu_);
   evidence_.views.clear();
+  std::string shares = fmt::format("{:.1f} % of the left image", 100 * fixed.share[0]);
+  if (rig_.has_right()) shares += fmt::format(", {:.1f} % of the right one", 100 * fixed.share[1]);
   if (!fixed.judged()) not_judged("masks of what is fixed in view: the rig turns too little, or its readings do not say so");
-  else
-    measured(fmt::format("edges that stay in place: {:.1f} % of the left image, {:.1f} % of the right one ({} pairs of images)",
-                         100 * fixed.share[0], 100 * fixed.share[1], fixed.pairs));
+  else measured(fmt::format("edges that stay in place: {} ({} pairs of images)", shares, fixed.pairs));
   if (!fixed.any()) return false;
   Finding& finding = found(FindingKind::fixed_in_view, std::max(fixed.share[0], fixed.share[1]), 0, "of the image");
-  finding.measured = fmt::format(
-      "{:.1f} % of the left image and {:.1f} % of the right one stay as they are while the scene moves, and {:.0f} % of the features",
-      100 * fixed.share[0], 100 * fixed.share[1], 100 * share_of_features);
+  finding.measured =
+      fmt::format("{} stay as they are while the scene moves, and {:.0f} % of the features", shares, 100 * share_of_features);
   finding.expected = "nothing of the vehicle in view";
   finding.advice =
       "give the calibration the masks that `fbvins doctor DATASET --out FOLDER` writes, or move the camera, or clean its lens";

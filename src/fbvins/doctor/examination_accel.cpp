@@ -173,14 +173,18 @@ void Examination::accel_scale(const AccelFit& fit) {
   if (std::abs(factor - 1) < kScalePractical || std::abs(factor - 1) < (confirmed ? kConfirmed : kSignificant) * sigma) return;
   const double gravity = fit.gravity_mps2 / kGravity_mps2;
   const double by_baseline = std::abs(gravity - 1 / factor), by_accelerometer = std::abs(gravity - 1);
-  if (by_baseline + kGravityTells < by_accelerometer) return baseline_length(factor, sigma);
+  const bool metres_tell = by_baseline + kGravityTells < by_accelerometer;  // those of the images
+  if (metres_tell && rig_.has_right()) return baseline_length(factor, sigma);
   Finding& finding = found(FindingKind::accel_scale, 100 * (factor - 1), 100 * sigma, "%");
   finding.measured = fmt::format(
       "the accelerometer's readings are {:.1f} +- {:.1f} % too large for the accelerations that the images show, in which gravity is {:.2f} +- {:.2f} m/s^2",
       finding.size, finding.sigma, fit.gravity_mps2, fit.gravity_sigma_mps2);
   finding.expected = "within 3 %, and gravity is 9.81 m/s^2";
   finding.advice = fmt::format("multiply the accelerometer's readings by {:.4f}, or look up its range", 1 / factor);
-  if (std::abs(by_baseline - by_accelerometer) < kGravityTells)
+  if (metres_tell) finding.advice = fmt::format("multiply the depths by {:.4f}: gravity says that they are wrong", factor);
+  else if (std::abs(by_baseline - by_accelerometer) < kGravityTells && !rig_.has_right())
+    finding.advice = fmt::format("{}; or the depths by {:.4f}: gravity does not tell which here", finding.advice, factor);
+  else if (std::abs(by_baseline - by_accelerometer) < kGravityTells)
     finding.advice = fmt::format("{}; or the baseline is {:.1f} mm long: gravity does not tell which here, so measure it",
                                  finding.advice, 1e3 * rig_.T_C1C0().p.norm() * factor);
 }

@@ -89,6 +89,7 @@ StereoFit Examination::pair_fit(StereoRig rig, bool focal_known) {
 }
 
 void Examination::stereo() {
+  if (!rig_.has_right()) return;
   const StereoFit fit = pair_fit(rig_, false);
   pair_ = {.before = rig_, .first_finding = out_.findings.size(), .changes = fit.changes};
   const auto views = static_cast<double>(std::max<std::size_t>(evidence_.stereo.size(), 1));

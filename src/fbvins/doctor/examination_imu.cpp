@@ -37,6 +37,10 @@ double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
   if (has(FindingKind::clocks_apart)) return;
+  if (!rig_.has_right() && !rig_.depth) {
+    not_judged("gyroscope, accelerometer, lens, rotation and time between camera and IMU: one camera does not measure depth");
+    return;
+  }
   if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
     turns_seen_ = true;
     not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");
@@ -179,10 +183,14 @@ void Examination::motion_change(const MotionChange& change) {
     gyro_bias_ = factor.cwiseProduct(gyro_bias_);
   } else if (change.kind == FindingKind::rolling_shutter) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
-    finding.measured =
-        fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first", finding.size, finding.sigma);
-    finding.expected = "0: all lines at once";
-    finding.advice = "use a global shutter; rolling shutters are not modelled";
+    const double calibrated_ms = 1e3 * rig_.times(0).line_delay_s * rig_.left.height();
+    finding.measured = fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first",
+                                   calibrated_ms + finding.size, finding.sigma);
+    finding.expected = calibrated_ms == 0 ? "0, as the calibration has no line delay"
+                                          : fmt::format("{:.1f} ms by the calibration", calibrated_ms);
+    finding.advice = "put the line delay into the calibration";
+    rig_.line_delay_s += change.amount(0) / rig_.left.height();
+    finding.fields = {CalibrationField::line_delay};
   } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
              change.kind == FindingKind::distortion) {
     // If one lens alone were wrong, the stereo pair would show it.

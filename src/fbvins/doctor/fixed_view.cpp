@@ -225,7 +225,7 @@ double bias_at_most(const std::vector<const SmallView*>& views, const ImuSeries&
 
 void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const Pyramid& right) {
   moved_px_ += moved_px;
-  if (left.empty() || right.empty() || (!views_.empty() && moved_px_.norm() < kStep_px)) return;
+  if (left.empty() || (of_a_pair_ && right.empty()) || (!views_.empty() && moved_px_.norm() < kStep_px)) return;
   if (++skipped_ < stride_) return;
   views_.push_back({t, known_ ? moved_px_ : Vec2::Zero(), half_of(left), half_of(right)});
   moved_px_.setZero();
@@ -253,11 +253,12 @@ bool FixedInView::judged() const { return pairs >= kFewestPairs; }
 
 FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
   FixedInView out;
+  const int cameras = evidence.rig.has_right() ? 2 : 1;
   std::array<Looks, 2> looks;
-  for (int side = 0; side < 2; ++side) looks[static_cast<std::size_t>(side)].camera = &evidence.rig.camera(side);
+  for (int side = 0; side < cameras; ++side) looks[static_cast<std::size_t>(side)].camera = &evidence.rig.camera(side);
   std::vector<const SmallView*> views;
   for (const SmallView& view : evidence.views)
-    if (view.left && view.right) views.push_back(&view);
+    if (view.left && (view.right || cameras == 1)) views.push_back(&view);
   const double bias_radps = bias_at_most(views, imu);
   for (std::size_t i = 0; i < views.size(); ++i) {
     Vec2 moved_px = Vec2::Zero();
@@ -276,14 +277,14 @@ FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
       moved_px.setZero();
     }
     out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left.focal_px() * (turned_rad.norm() - by_bias_rad) > kTurned_px;
-    for (int side = 0; side < 2; ++side)
+    for (int side = 0; side < cameras; ++side)
       looks[static_cast<std::size_t>(side)].all.push_back(
           {(side == 0 ? views[i]->left : views[i]->right).get(), moved_px.cast<float>(),
            Vec3(evidence.rig.T_BC(side).q.conjugate() * turned_rad).cast<float>(), by_bias_rad});
   }
   if (!out.judged()) return out;
   judge(out, 0, looks[0], evidence.rig.left);
-  judge(out, 1, looks[1], evidence.rig.right);
+  if (cameras == 2) judge(out, 1, looks[1], evidence.rig.right);
   return out;
 }
 

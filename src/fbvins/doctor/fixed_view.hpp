@@ -20,6 +20,8 @@ namespace fbvins {
 /// Keeps small images between which the scene moved, at most as many as memory allows, spread over the recording.
 class ViewSampler {
  public:
+  /// Of a pair views need both images.
+  explicit ViewSampler(bool of_a_pair = true) : of_a_pair_(of_a_pair) {}
   /// `moved_px`: motion of the scene in the left image since the image before. An image that is missing has an empty pyramid.
   void add(Time t, const Vec2& moved_px, const Pyramid& left, const Pyramid& right);
   /// The motion since the image before is not known.
@@ -27,6 +29,7 @@ class ViewSampler {
   std::vector<SmallView> take() { return std::move(views_); }
 
  private:
+  bool of_a_pair_;
   std::vector<SmallView> views_;
   Vec2 moved_px_ = Vec2::Zero();  // since the last view
   bool known_ = true;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fbvins/camera/camera_times.hpp"
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/fixed_view.hpp"
@@ -60,8 +61,10 @@ bool is_bright_dot(const PyramidLevel& image, const Vec2& px) {
 }  // namespace
 
 struct EvidenceGatherer::State {
-  explicit State(const StereoRig& rig) : images(rig, kKltLevels), follower(rig.left), tracks(kFeatures), detector(kDistance_px) {
+  explicit State(const StereoRig& rig)
+      : images(rig, kKltLevels), follower(rig.left), tracks(kFeatures), detector(kDistance_px), sampler(rig.has_right()) {
     evidence.rig = evidence.working_rig = rig;
+    if (rig.depth) depths.emplace(rig);
   }
 
   void count_repeated(const StereoFrame& frame);
@@ -73,7 +76,11 @@ struct EvidenceGatherer::State {
   void follow();
   void note_scene_motion();
   void detect();
-  void match(SeenFrame& seen);
+  bool has_depths(const StereoFrame& frame) const {
+    return depths ? depths->is_usable(frame.depth.get()) : !images.right().empty();
+  }
+  std::optional<double> depth_of(const KltTrack& track, const StereoFrame& frame);
+  void match(SeenFrame& seen, const StereoFrame& frame);
   void note(SeenFrame& seen);
   bool enough() const {
     return moving_s >= kMoving_s ||
@@ -91,7 +98,8 @@ struct EvidenceGatherer::State {
   FreeStereo free_stereo;
   ViewSampler sampler;
   StereoRealigner realigner;
-  std::optional<KltStereoMatcher> stereo;
+  std::optional<KltStereoMatcher> stereo;  ///< of a pair
+  std::optional<DepthReader> depths;       ///< of a camera with a depth sensor
   Time last_view, last_depths;
   double moving_s = 0;
 };
@@ -156,10 +164,12 @@ void EvidenceGatherer::State::put_in_order() {
 /// Fits the stereo pair to the held images; from here on features have depths.
 void EvidenceGatherer::State::end_prelude() {
   prelude = false;
-  put_in_order();
-  const StereoFit fit = fit_stereo(views_of_few(), evidence.rig, nullptr, {});
-  evidence.working_rig = fit.rig;
-  stereo.emplace(evidence.working_rig, kNearest_m);
+  if (evidence.rig.has_right()) {
+    put_in_order();
+    const StereoFit fit = fit_stereo(views_of_few(), evidence.rig, nullptr, {});
+    evidence.working_rig = fit.rig;
+    stereo.emplace(evidence.working_rig, kNearest_m);
+  }
   std::vector<StereoFrame> first = std::move(held);
   for (StereoFrame& frame : first) look(std::move(frame));
 }
@@ -180,12 +190,11 @@ void EvidenceGatherer::State::look(StereoFrame frame) {
   seen.t = frame.t;
   seen.gradients = gradient_energies(images.left());
   const double slack_s = 0.3 * kDepthStep_s;
-  const bool has_right = !images.right().empty();
-  if (has_right && (evidence.frames.empty() || (frame.t - last_depths).seconds() > kDepthStep_s - slack_s)) {
-    match(seen);
+  if (has_depths(frame) && (evidence.frames.empty() || (frame.t - last_depths).seconds() > kDepthStep_s - slack_s)) {
+    match(seen, frame);
     last_depths = frame.t;
   }
-  if (has_right && (evidence.stereo.empty() || (frame.t - last_view).seconds() > kStereoStep_s - slack_s)) {
+  if (!images.right().empty() && (evidence.stereo.empty() || (frame.t - last_view).seconds() > kStereoStep_s - slack_s)) {
     evidence.stereo.push_back(
         {frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, images.left(), images.right())});
     last_view = frame.t;
@@ -236,18 +245,22 @@ void EvidenceGatherer::State::detect() {
   }
 }
 
-void EvidenceGatherer::State::match(SeenFrame& seen) {
-  seen.has_depths = true;
-  for (KltTrack& track : tracks) {
-    const auto ray = evidence.working_rig.left.undistort(track.px);
-    const bool matched = ray && [&] {
-      const StereoMatch found =
-          stereo->match(tracks.patches(track).newest, track.px, *ray, track.inverse_depth, images.left(), images.right());
-      if (found.failure == StereoFailure::none) track.inverse_depth = found.inverse_depth;
-      return found.failure == StereoFailure::none;
-    }();
-    if (!matched) track.inverse_depth.reset();
+/// Inverse: by the right image, or the depth image.
+std::optional<double> EvidenceGatherer::State::depth_of(const KltTrack& track, const StereoFrame& frame) {
+  if (depths) {
+    const auto measured = depths->at(*frame.depth, track.px);
+    return measured ? std::optional(measured->value) : std::nullopt;
   }
+  const auto ray = evidence.working_rig.left.undistort(track.px);
+  if (!ray) return std::nullopt;
+  const StereoMatch found =
+      stereo->match(tracks.patches(track).newest, track.px, *ray, track.inverse_depth, images.left(), images.right());
+  return found.failure == StereoFailure::none ? std::optional(found.inverse_depth) : std::nullopt;
+}
+
+void EvidenceGatherer::State::match(SeenFrame& seen, const StereoFrame& frame) {
+  seen.has_depths = true;
+  for (KltTrack& track : tracks) track.inverse_depth = depth_of(track, frame);
 }
 
 void EvidenceGatherer::State::note(SeenFrame& seen) {

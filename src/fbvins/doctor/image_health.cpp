@@ -66,13 +66,15 @@ struct Moved {
 };
 
 /// Motions of the features perpendicular to the baseline, along which a projector's spots move with the depth of the scene.
+/// Without a baseline, `across` of zero, along any direction.
 std::vector<Moved> motions_across(const SeenFrame& a, const SeenFrame& b, const Vec2& across) {
   std::vector<Moved> out;
   auto there = b.features.begin();
   for (const SeenFeature& feature : a.features) {
     while (there != b.features.end() && there->id < feature.id) ++there;
     if (there != b.features.end() && there->id == feature.id)
-      out.push_back({feature.id, std::abs((there->px - feature.px).dot(across))});
+      out.push_back(
+          {feature.id, across.isZero() ? (there->px - feature.px).norm() : std::abs((there->px - feature.px).dot(across))});
   }
   return out;
 }
@@ -115,7 +117,7 @@ double share_of_dots(const Evidence& evidence) {
 }  // namespace
 
 FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu) {
-  const Vec3 baseline = evidence.rig.T_C1C0().p.normalized();
+  const Vec3 baseline = evidence.rig.has_right() ? evidence.rig.T_C1C0().p.normalized() : Vec3::Zero();
   const Vec2 across = Vec2(-baseline.y(), baseline.x()).normalized();
   const double focal_px = evidence.rig.left.focal_px();
   std::map<std::int64_t, Stays> features;

@@ -25,7 +25,7 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
       offset(Duration::from_seconds(start.offset_s + x(kTime))),
       bias(x.segment<3>(kBias)),
       scale((x.segment<3>(kAxis).array() + x(kScale)).exp().matrix()),
-      rolling_s(x(kRolling)) {}
+      rolling_s(start.rig.times(0).line_delay_s * start.rig.left.height() + x(kRolling)) {}
 
 }  // namespace doctor::motion
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor on a rig of more than two cameras: each pair of it is examined, and what was found is told with the numbers of its
-// cameras. Pure functions.
+// The doctor on a rig of more than two cameras: each pair of it is examined, and each camera without a partner, and what was
+// found is told with the numbers of its cameras. Pure functions.
 #pragma once
 
 #include "fbvins/camera/camera_groups.hpp"
@@ -8,11 +8,11 @@
 
 namespace fbvins {
 
-/// The images of a pair's cameras as left and right, at the instant of the left one; none where neither has one.
-std::optional<StereoFrame> frame_of_pair(const StereoFrame& frame, const CameraGroup& pair);
+/// The images of a group's cameras as left and right, at the instant of the left one; none where neither has one.
+std::optional<StereoFrame> frame_of_group(const StereoFrame& frame, const CameraGroup& group);
 
-/// Adds what was found with a pair's cameras to the diagnosis of their rig. `first`: nothing was added before; of further pairs
+/// Adds what was found with a group's cameras to the diagnosis of their rig. `first`: nothing was added before; of further groups
 /// what concerns the IMU or the clocks, which is known already, is left out.
-void add_pair(const Diagnosis& of_pair, const CameraGroup& pair, bool first, Diagnosis& all);
+void add_group(const Diagnosis& found, const CameraGroup& group, bool first, Diagnosis& all);
 
 }  // namespace fbvins

@@ -34,14 +34,14 @@ TEST(RigDiagnosis, FramesOfAPairHaveItsImagesAsLeftAndRight) {
   StereoFrame frame{Time{1000}, std::make_shared<const Image>(1, 1), nullptr};
   frame.more = {nullptr, std::make_shared<const Image>(2, 1)};
   frame.offsets = ExposureOffsets({Duration{0}, Duration{5}, Duration{0}, Duration{7}});
-  const auto back = frame_of_pair(frame, {1, 3});
+  const auto back = frame_of_group(frame, {1, 3});
   ASSERT_TRUE(back);
   EXPECT_EQ(back->t, Time{1005});
   EXPECT_EQ(back->left, nullptr);
   EXPECT_EQ(back->right->width(), 2);
   EXPECT_EQ(back->offsets.of(1), Duration{2});
   frame.more.clear();
-  EXPECT_FALSE(frame_of_pair(frame, {1, 3}));
+  EXPECT_FALSE(frame_of_group(frame, {1, 3}));
 }
 
 TEST(RigDiagnosis, FindingsHaveTheNumbersOfTheirCamerasAndTheImuIsJudgedOnce) {
@@ -50,10 +50,10 @@ TEST(RigDiagnosis, FindingsHaveTheNumbersOfTheirCamerasAndTheImuIsJudgedOnce) {
   const CameraGroup ahead{0, 2}, back{1, 3};
   Diagnosis all;
   all.rig = rig;
-  add_pair(with(rig_of(rig, ahead), {gyro_units, baseline_length}), ahead, true, all);
+  add_group(with(rig_of(rig, ahead), {gyro_units, baseline_length}), ahead, true, all);
   Diagnosis second = with(rig_of(rig, back), {gyro_units, time_offset, focal_length});
   second.rig.right = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
-  add_pair(second, back, false, all);
+  add_group(second, back, false, all);
   ASSERT_EQ(all.findings.size(), 3u);
   EXPECT_EQ(all.findings[0].measured, "it is so");
   EXPECT_EQ(all.findings[1].measured, "cameras 0 and 2 as left and right: it is so");
@@ -65,8 +65,8 @@ TEST(RigDiagnosis, FindingsHaveTheNumbersOfTheirCamerasAndTheImuIsJudgedOnce) {
   EXPECT_TRUE(!all.masks[0] && !all.masks[1] && all.masks[2] && all.masks[3]);
 }
 
-/// A recording without any event: only which pairs are examined shows.
-TEST(RigDiagnosis, EachPairIsExaminedAndCamerasWithoutAPartnerAreTold) {
+/// A recording without any event: only which cameras are examined shows.
+TEST(RigDiagnosis, EachPairIsExaminedAndEachCameraWithoutAPartner) {
   StereoRig rig = quad();
   rig.more.push_back({rig.left, {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), Vec3(0.3, 0, 0)}});
   int played = 0;
@@ -79,7 +79,7 @@ TEST(RigDiagnosis, EachPairIsExaminedAndCamerasWithoutAPartnerAreTold) {
   };
   EXPECT_TRUE(told("cameras 0 and 2 as left and right: "));
   EXPECT_TRUE(told("cameras 1 and 3 as left and right: "));
-  EXPECT_TRUE(told("camera 4: by the calibration it overlaps with no other"));
+  EXPECT_TRUE(told("camera 4: gyroscope, accelerometer, lens"));
 }
 
 }  // namespace rig_diagnosis_test

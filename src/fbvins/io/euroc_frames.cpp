@@ -231,8 +231,8 @@ std::string untriggered_sentence(const std::vector<FrameEntry>& frames, int came
   for (const FrameEntry& frame : frames)
     if (const Duration offset = frame.offsets.of(camera); offset.ns != 0) offsets_ms.push_back(1e3 * offset.seconds());
   return fmt::format(
-      "cameras 0 and {} have no common trigger: their stamps are more than {} ms apart, {:.1f} ms in the median, and count as they "
-      "are",
+      "cameras 0 and {} have no common trigger: by stamps and time offsets their images are more than {} ms apart, {:.1f} ms in "
+      "the median, and count as taken then",
       camera, tolerance_ms, median(offsets_ms));
 }
 

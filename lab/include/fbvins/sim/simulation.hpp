@@ -58,9 +58,9 @@ struct SimulationOptions {
     v("seed", seed, "", "of all random numbers", 0, 2'000'000'000);
     v("image_rate_hz", image_rate_hz, "Hz", "stereo frames per second", 1.0, 200.0);
     v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
-    v("rig", rig, "stereo|quad|sides|rgbd|fisheye|back-to-back",
-      "cameras: the two of the calibration; and two more of the same kind that look backwards, or one to each side; or the left "
-      "one with a depth sensor; or two with lenses of 200 degrees, side by side or back to back");
+    v("rig", rig, "stereo|mono|quad|sides|rgbd|fisheye|back-to-back",
+      "cameras: the two of the calibration; or the left one alone; or two more of the same kind that look backwards, or one to each "
+      "side; or the left one with a depth sensor; or two with lenses of 200 degrees, side by side or back to back");
     v.group("flight", flight, "how the rig moves");
     v.group("recorded", recorded, "a recorded flight instead");
     v.group("imu", imu, "errors of the IMU");
@@ -72,8 +72,8 @@ struct SimulationOptions {
 };
 
 /// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
-/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs), rgbd (one camera and a depth sensor), fisheye and
-/// back-to-back (two lenses of 200 degrees), legs and propellers (of the vehicle, in view).
+/// normal light, handheld, takeoff, hover, tour, hall, mono (one camera), quad (two stereo pairs), rgbd (one camera and a depth
+/// sensor), fisheye and back-to-back (two lenses of 200 degrees), legs and propellers (of the vehicle, in view).
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 
