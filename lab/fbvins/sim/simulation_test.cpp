@@ -131,7 +131,9 @@ TEST(Simulation, OneCameraSeesWhatTheLeftOneOfAPairSees) {
   const auto frame = [](const char* rig) {
     SimulationOptions options = short_flight("normal");
     options.rig = rig;
-    return render_frame(*prepare_simulation(options), 4).frame;
+    auto simulation = prepare_simulation(options);
+    EXPECT_TRUE(simulation);
+    return render_frame(*simulation, 4).frame;
   };
   const StereoFrame one = frame("mono"), pair = frame("stereo");
   EXPECT_EQ(one.right, nullptr);
