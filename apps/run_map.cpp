@@ -18,7 +18,18 @@ namespace {
 
 constexpr const char* kUpdatesHeader =
     "#timestamp [ns],frame,applies_from,localised,session,x [m],y [m],z [m],yaw [rad],keyframes,candidates,accepted,refused,"
-    "optimised,anchors,anchors_refused,anchored\n";
+    "optimised,anchors,anchors_refused,anchored,M_moved,moved_x [m],moved_y [m],moved_z [m],moved_qw,moved_qx,moved_qy,moved_qz\n";
+
+/// One row of map_updates.csv; where M did not move, the identity.
+std::string row_of(const MapUpdate& u) {
+  const Pose<M, M> moved = u.M_moved.value_or(Pose<M, M>{});
+  return fmt::format(
+      "{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f},{},{},{},{},{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}\n",
+      u.t.ns, u.frame.value, u.applies_from.value, u.localised ? 1 : 0, u.map_session, u.T_MW.p.x(), u.T_MW.p.y(), u.T_MW.p.z(),
+      yaw_of(u.T_MW.q), u.stats.keyframes, u.stats.candidates, u.stats.accepted, u.stats.refused, u.stats.optimised ? 1 : 0,
+      u.stats.anchors, u.stats.anchors_refused, u.anchored ? 1 : 0, u.M_moved ? 1 : 0, moved.p.x(), moved.p.y(), moved.p.z(),
+      moved.q.w(), moved.q.x(), moved.q.y(), moved.q.z());
+}
 
 Result<void> check_folder_of(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
@@ -149,11 +160,7 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
   if (Result<void> done = write_tum(record.causal, folder + "/map_causal_tum.txt"); !done) return done;
   if (Result<void> done = write_tum(record.bounded, folder + "/map_bounded_tum.txt"); !done) return done;
   std::string text = kUpdatesHeader;
-  for (const MapUpdate& u : record.updates)
-    text += fmt::format("{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f},{},{},{},{},{},{},{},{}\n", u.t.ns, u.frame.value,
-                        u.applies_from.value, u.localised ? 1 : 0, u.map_session, u.T_MW.p.x(), u.T_MW.p.y(), u.T_MW.p.z(),
-                        yaw_of(u.T_MW.q), u.stats.keyframes, u.stats.candidates, u.stats.accepted, u.stats.refused,
-                        u.stats.optimised ? 1 : 0, u.stats.anchors, u.stats.anchors_refused, u.anchored ? 1 : 0);
+  for (const MapUpdate& u : record.updates) text += row_of(u);
   return write_text(folder + "/map_updates.csv", text);
 }
 

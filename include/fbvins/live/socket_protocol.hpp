@@ -6,7 +6,8 @@
 //   int connection = socket(AF_UNIX, SOCK_SEQPACKET, 0);          // every message is one packet
 //   connect(connection, ...);
 //   send a FbvinsSocketHello, with the images' memory as SCM_RIGHTS; wait for FbvinsSocketWelcome
-//   send FbvinsSocketImu and FbvinsSocketFrame as the sensors deliver, take FbvinsSocketReleased and FbvinsSocketStatus
+//   send FbvinsSocketImu and FbvinsSocketFrame as the sensors deliver, take FbvinsSocketReleased, FbvinsSocketStatus,
+//   FbvinsSocketMap
 //
 // Numbers are in this machine's byte order (both ends run on it). All fields are at multiples of their size: no padding.
 // Reserved fields are 0.
@@ -17,7 +18,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 6,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 7,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -35,7 +36,8 @@ enum {
   FBVINS_SOCKET_TAG = 7,       ///< sender to estimator, since version 1.5
   FBVINS_SOCKET_WELCOME = 65,  ///< estimator to sender
   FBVINS_SOCKET_RELEASED = 66,
-  FBVINS_SOCKET_STATUS = 67
+  FBVINS_SOCKET_STATUS = 67,
+  FBVINS_SOCKET_MAP = 68  ///< since version 1.7
 };
 
 typedef struct FbvinsSocketHeader {
@@ -238,5 +240,22 @@ typedef struct FbvinsSocketStatus {
   uint32_t reset_counter;  ///< +1 whenever the estimator started again
   uint32_t reserved;
 } FbvinsSocketStatus;
+
+/// FbvinsSocketMap::flags
+enum { FBVINS_SOCKET_LOCALISED = 1, FBVINS_SOCKET_ANCHORED = 2 };
+
+/// Where W lies in the map (docs/maps.md), after a keyframe, where there is a map; the newest one counts. To senders whose hello
+/// has version 1.7 or later. Poses are a position in m and an orientation w, x, y, z.
+typedef struct FbvinsSocketMap {
+  FbvinsSocketHeader header;
+  int64_t t_ns;  ///< of the keyframe
+  uint32_t reset_counter;
+  uint32_t flags;                   ///< without FBVINS_SOCKET_LOCALISED the poses of W are not known, and 0
+  double p_MW[3], q_MW[4];          ///< p_M = q_MW p_W + p_MW
+  double p_smooth[3], q_smooth[4];  ///< the same at a bounded speed
+  double p_MM0[3], q_MM0[4];        ///< from M as it was at the estimator's beginning to M now: M was levelled, or anchored
+  uint32_t moves;                   ///< how often M has moved
+  uint32_t reserved;
+} FbvinsSocketMap;
 
 #endif

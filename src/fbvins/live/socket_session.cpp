@@ -133,6 +133,11 @@ void SocketSession::send_status(std::uint32_t health, std::uint32_t reset_counte
           {}, counts_.frames, counts_.frames_missed, counts_.readings, counts_.readings_refused, held, health, reset_counter, 0});
 }
 
+bool SocketSession::send_map(const FbvinsSocketMap& map) {
+  constexpr int kFirstMinor = 7;  // earlier senders know no such message
+  return hello_->minor < kFirstMinor || send(FBVINS_SOCKET_MAP, map);
+}
+
 void SocketSession::fail(const Error& error) {
   refuse(error.code == ErrorCode::unsupported ? FBVINS_SOCKET_WRONG_VERSION : FBVINS_SOCKET_MALFORMED, error.message);
 }

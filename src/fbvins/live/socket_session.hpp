@@ -47,6 +47,8 @@ class SocketSession {
   /// True when the message could not be sent yet, because the sender does not read.
   bool send_released();
   void send_status(std::uint32_t health, std::uint32_t reset_counter);
+  /// False when it could not be sent yet, because the sender does not read.
+  bool send_map(const FbvinsSocketMap& map);
   /// Sends the sender a goodbye with the reason, and ends the session.
   void refuse(std::uint32_t reason, const std::string& sentence);
 

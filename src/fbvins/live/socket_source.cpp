@@ -33,6 +33,26 @@ std::uint32_t health_number(HealthState state) {
   return FBVINS_SOCKET_UNKNOWN;
 }
 
+template <class To, class From>
+void write_pose(const Pose<To, From>& T, double (&p)[3], double (&q)[4]) {
+  Eigen::Map<Vec3>{p} = T.p;
+  q[0] = T.q.w(), q[1] = T.q.x(), q[2] = T.q.y(), q[3] = T.q.z();
+}
+
+FbvinsSocketMap map_message(const MapUpdate& update, const Pose<M, M>& T_MM0, std::uint32_t moves) {
+  FbvinsSocketMap map{};
+  map.t_ns = update.t.ns;
+  map.reset_counter = update.reset_counter;
+  map.flags = (update.localised ? FBVINS_SOCKET_LOCALISED : 0u) | (update.anchored ? FBVINS_SOCKET_ANCHORED : 0u);
+  if (update.localised) {
+    write_pose(update.T_MW, map.p_MW, map.q_MW);
+    write_pose(update.T_MW_smooth, map.p_smooth, map.q_smooth);
+  }
+  write_pose(T_MM0, map.p_MM0, map.q_MM0);
+  map.moves = moves;
+  return map;
+}
+
 }  // namespace
 
 /// The estimator's state, from the status sink's thread to the source's.
@@ -41,6 +61,10 @@ struct SocketSource::Report {
   std::uint32_t health = FBVINS_SOCKET_UNKNOWN;
   std::uint32_t reset_counter = 0;
   bool fresh = false;
+  Pose<M, M> T_MM0;
+  std::uint32_t moves = 0;
+  std::optional<FbvinsSocketMap> map;
+  bool map_sent = false;
 };
 
 class SocketSource::StatusSink final : public Sink {
@@ -56,6 +80,12 @@ class SocketSource::StatusSink final : public Sink {
       report_->health = health;
       report_->reset_counter = status->reset_counter;
       if (report_->fresh) wake_->signal();
+    } else if (const auto* update = std::get_if<MapUpdate>(&event)) {
+      const std::lock_guard lock(report_->mutex);
+      if (update->M_moved) report_->T_MM0 = *update->M_moved * report_->T_MM0, ++report_->moves;
+      report_->map = map_message(*update, report_->T_MM0, report_->moves);
+      report_->map_sent = false;
+      wake_->signal();
     }
     return {};
   }
@@ -146,6 +176,8 @@ void SocketSource::greet(bool begin) {
   if (!session_->ended().empty()) return let_go();
   if (!session_->greeted()) return;
   say(fmt::format("{} is connected", session_->name()));
+  const std::lock_guard lock(report_->mutex);
+  report_->map_sent = false;
   next_ = Clock::now();
   if (begin) session_->welcome();
 }
@@ -184,6 +216,7 @@ void SocketSource::serve(SensorInput& input) {
 
 void SocketSource::send_status() {
   const std::lock_guard lock(report_->mutex);
+  if (report_->map && !report_->map_sent) report_->map_sent = session_->send_map(*report_->map);
   if (!report_->fresh && Clock::now() < next_) return;
   session_->send_status(report_->health, report_->reset_counter);
   report_->fresh = false;

@@ -3,7 +3,7 @@
 // has another version is disconnected with a sentence, and the next one may connect.
 //
 //   auto source = SocketSource::open("/run/fbvins.sock", {.rig = *rig, .say = warn});
-//   live.add_sink((*source)->status_sink());          // senders get the estimator's health
+//   live.add_sink((*source)->status_sink());          // senders get the estimator's health, and M
 //   Result<void> end = (*source)->run(live.input());  // until stop()
 #pragma once
 

@@ -332,6 +332,63 @@ TEST_F(SocketSourceTest, TheSenderHearsOfTheEstimatorsHealthAndOfWhatArrived) {
   EXPECT_EQ(heard.slots_held, 2u);
 }
 
+/// The next FbvinsSocketMap that a sender gets.
+FbvinsSocketMap heard_map(TestSender& sender) {
+  EXPECT_EQ(sender.answer(), std::uint32_t{FBVINS_SOCKET_MAP});
+  return sender.last<FbvinsSocketMap>();
+}
+
+TEST_F(SocketSourceTest, TheSenderHearsWhereWLiesInTheMapAndHowMHasMoved) {
+  MapUpdate update;
+  update.t = Time{7};
+  update.localised = true;
+  update.reset_counter = 2;
+  update.T_MW = {Quat::Identity(), Vec3(1, 2, 3)};
+  update.T_MW_smooth = {Quat::Identity(), Vec3(1, 2, 2)};
+  const Pose<M, M> turned(Quat(0, 0, 0, 1), Vec3(0, 0, 0)), moved(Quat::Identity(), Vec3(5, 0, 0));
+  update.M_moved = turned;
+  ASSERT_TRUE(status_->take(update));
+  update.M_moved = moved;
+  update.anchored = true;
+  ASSERT_TRUE(status_->take(update));
+  {
+    TestSender sender(path());
+    ASSERT_EQ(sender.begin(), std::uint32_t{FBVINS_SOCKET_WELCOME});
+    const FbvinsSocketMap map = heard_map(sender);  // from before it came
+    EXPECT_EQ(map.t_ns, 7);
+    EXPECT_EQ(map.reset_counter, 2u);
+    EXPECT_EQ(map.flags, std::uint32_t{FBVINS_SOCKET_LOCALISED | FBVINS_SOCKET_ANCHORED});
+    EXPECT_EQ(map.p_MW[2], 3);
+    EXPECT_EQ(map.p_smooth[2], 2);
+    EXPECT_EQ(map.q_MW[0], 1);
+    EXPECT_EQ(map.moves, 2u);
+    EXPECT_EQ(map.p_MM0[0], 5) << "the moves one after the other";
+    EXPECT_EQ(map.q_MM0[3], 1);
+    update = {};
+    ASSERT_TRUE(status_->take(update));
+    const FbvinsSocketMap lost = heard_map(sender);
+    EXPECT_EQ(lost.flags, 0u);
+    EXPECT_EQ(lost.q_MW[0], 0);
+    EXPECT_EQ(lost.moves, 2u);
+  }
+  TestSender earlier(path());
+  FbvinsSocketHello hello = hello_message(nullptr);
+  hello.minor = 6;
+  const FileDescriptor memory = test::test_memory();
+  earlier.send(bytes_of(hello), memory.number());
+  ASSERT_EQ(earlier.answer(), std::uint32_t{FBVINS_SOCKET_WELCOME});
+  ASSERT_TRUE(status_->take(update));
+  LiveStatus status;
+  status.reset_counter = 9;
+  ASSERT_TRUE(status_->take(status));
+  for (FbvinsSocketStatus heard{}; heard.reset_counter != 9;) {  // and no message that it does not know
+    const auto bytes = earlier.receive();
+    ASSERT_EQ(bytes.size(), sizeof(heard));
+    std::memcpy(&heard, bytes.data(), sizeof(heard));
+    ASSERT_EQ(heard.header.type, std::uint32_t{FBVINS_SOCKET_STATUS});
+  }
+}
+
 TEST_F(SocketSourceTest, ASenderThatNeverReadsIsStillHeard) {
   TestSender sender(path());
   ASSERT_EQ(sender.begin(), std::uint32_t{FBVINS_SOCKET_WELCOME});

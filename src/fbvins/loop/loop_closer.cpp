@@ -29,8 +29,6 @@ constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDe
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
 /// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
 constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
-/// A new M is levelled anew where it leans by more than this, and by more than so many standard deviations of the vertical.
-constexpr double kLeaning_rad = 0.25 * kDegree, kLeaningSigmas = 3;
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
 
@@ -110,44 +108,6 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
   follower_.forget();
   frame_.level(session_.q_LG);
   if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
-}
-
-/// Takes the newest estimate of gravity. Verticals follow it at once; M, where the flight began it, once it leans enough.
-std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
-  if (gauge.q_LG.coeffs() != session_.q_LG_newest.coeffs()) map_.level(session_.number, gauge.q_LG);
-  session_.q_LG_newest = gauge.q_LG;
-  const bool may_lean = session_.began_map && map_.anchors.empty() && options_.degrees_of_freedom == 4;
-  const double leaning = std::max(kLeaning_rad, kLeaningSigmas * gauge.up_sigma_rad);
-  if (may_lean && angle_between(gauge.q_LG, session_.q_LG) <= leaning) return std::nullopt;
-  return level_by_newest();
-}
-
-/// From a new M to where it will be once it is levelled: about its first keyframe, which defines it.
-Pose<M, M> LoopCloser::to_upright() const {
-  if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs() || map_.empty()) return {};
-  const Quat turned = session_.q_LG_newest * session_.q_LG.conjugate();
-  const Vec3 first = map_.keyframes()[0].T_MB.p;
-  return {turned, Vec3(first - turned * first)};
-}
-
-/// Where the flight began the map, M is turned as a whole, which changes no relative pose; where anchors hold it, the body stays
-/// where it is. Where the flight has joined an older one, M is gravity-aligned already, and the flight's own keyframes are
-/// rotated. Returns how M moved, unless anchors hold it.
-std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
-  if (session_.q_LG_newest.coeffs() == session_.q_LG.coeffs()) return std::nullopt;
-  const Pose<M, M> upright = to_upright();
-  const Quat turned_in_M = frame_.yaw() * upright.q * frame_.yaw().conjugate();
-  session_.q_LG = session_.q_LG_newest;
-  std::optional<Pose<M, M>> moved;
-  if (session_.began_map && !map_.empty()) {
-    if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
-    else map_.move(upright), frame_.turn(upright), moved = upright;
-  } else {
-    for (auto k = map_.keyframes().rbegin(); k != map_.keyframes().rend() && k->session == session_.number; ++k)
-      k->T_MB.q = (turned_in_M * k->T_MB.q).normalized();
-  }
-  frame_.level(session_.q_LG);
-  return moved;
 }
 
 /// Path, drift and readings up to a keyframe.
