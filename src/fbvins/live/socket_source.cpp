@@ -43,8 +43,9 @@ FbvinsSocketMap map_message(const MapUpdate& update, const Pose<M, M>& T_MM0, st
   FbvinsSocketMap map{};
   map.t_ns = update.t.ns;
   map.reset_counter = update.reset_counter;
-  map.flags = (update.localised ? FBVINS_SOCKET_LOCALISED : 0u) | (update.anchored ? FBVINS_SOCKET_ANCHORED : 0u);
+  if (update.anchored) map.flags |= FBVINS_SOCKET_ANCHORED;
   if (update.localised) {
+    map.flags |= FBVINS_SOCKET_LOCALISED;
     write_pose(update.T_MW, map.p_MW, map.q_MW);
     write_pose(update.T_MW_smooth, map.p_smooth, map.q_smooth);
   }
