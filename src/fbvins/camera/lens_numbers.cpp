@@ -42,7 +42,7 @@ std::optional<LensModel> lens_of(std::string_view model_name, const std::array<d
 
 std::string outside_of_model(const std::string& model, const std::vector<double>& own) {
   const bool alpha_first = model == "eucm";
-  if (model == "omni")
+  if (model == "omni" || model == "omni-radtan")
     return own[0] >= 0 && own[0] < kLargestXi ? "" : fmt::format("xi is {}, not between 0 and {}", own[0], kLargestXi);
   if (model != "ds" && !alpha_first) return "";
   const double alpha = own[alpha_first ? 0 : 1];

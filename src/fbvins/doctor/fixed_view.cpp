@@ -29,6 +29,10 @@ constexpr int kAround_px = 15;
 /// An edge agrees with its mean where it has this share of its strength: gain and light change.
 constexpr double kStrength = 0.35;
 constexpr double kMostlyThere = 0.8;
+/// Square of the mean gradient against the mean square: near 1 of one edge, less where gain changes or dirt lets the scene shine
+/// through. Different edges of the scene that meet at a pixel, such as a room's under its ceiling, leave a mean that is weak
+/// beside each of them.
+constexpr float kOneEdge = 0.15f;
 /// In the small image: gaps in a fixed thing that are filled, specks that are not one, and the smallest one.
 constexpr int kGap_px = 5, kSpeck_px = 1, kSmallest_px = 80;
 /// The outer side of an edge, where the scene shows through the blur.
@@ -124,15 +128,19 @@ bool stays(const Looks& of, int x, int y, const Eigen::Vector2f& shared, std::ve
   const auto there = [&](std::size_t i) { return gradients[i].dot(across) > kStrength * strength; };
   const Eigen::RowVector3f by_turn = across.transpose() * of.motion_by_turn(x, y);
   int pairs = 0, stayed = 0, present = 0;
+  float squares = 0;
   for (std::size_t i = 0; i < looks.size(); ++i) {
     present += there(i);
+    squares += gradients[i].squaredNorm();
     if (i < kApart || std::abs(looks[i].moved_px.dot(across)) < kAcross_px ||
         std::abs(by_turn.dot(looks[i].turned_rad)) < kTurned_px + by_turn.norm() * looks[i].by_bias_rad)
       continue;
     ++pairs;
     stayed += there(i - kApart) && there(i);
   }
-  return pairs >= kFewestPairs && stayed >= kMostlyThere * pairs && present >= kMostlyThere * static_cast<double>(looks.size());
+  const auto count = static_cast<float>(looks.size());
+  return pairs >= kFewestPairs && stayed >= kMostlyThere * pairs && present >= kMostlyThere * count &&
+         strength * strength * count >= kOneEdge * squares;
 }
 
 /// Black pixels and those at most `by` away from one.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -105,6 +106,22 @@ TEST(FixedView, FindsNothingWhereNothingIsFixed) {
   const FixedInView fixed = find_fixed(seen, ImuSeries(seen.imu));
   EXPECT_TRUE(fixed.judged());
   EXPECT_FALSE(fixed.any());
+}
+
+/// As under the ceiling of a room: brighter downwards in each view, by a little, while edges that are stronger cross it.
+TEST(FixedView, EdgesOfTheSceneThatMeetAtAPixelAreNotFixed) {
+  Evidence seen = evidence(false, true, kSteady);
+  for (std::size_t i = 0; i < seen.views.size(); ++i) {
+    auto wall = std::make_shared<Image>(kWidth / 2, kHeight / 2, 60);
+    for (int y = 0; y < wall->height(); ++y)
+      for (int x = 0; x < wall->width(); ++x) {
+        const int stripe = (x + 7 * static_cast<int>(i)) / 3 % 5 == 0 ? 80 : 0;
+        wall->at(x, y) = static_cast<std::uint8_t>(60 + stripe + 6 * std::clamp(y - 55, 0, 10));
+      }
+    seen.views[i].left = seen.views[i].right = wall;
+  }
+  EXPECT_TRUE(find_fixed(seen, ImuSeries(seen.imu)).judged());
+  EXPECT_FALSE(find_fixed(seen, ImuSeries(seen.imu)).any());
 }
 
 TEST(FixedView, IsNotJudgedWhereTheReadingsShowNoTurn) {

@@ -194,4 +194,11 @@ TEST(MotionProblem, ALensStaysInTheRangeOfItsModel) {
 }
 
 }  // namespace parts_test
+
+TEST(LensChange, AUnifiedLensIsHeldToTheRangeOfItsXi) {
+  const auto lens = [](double xi) { return Camera(UnifiedRadtan{400, 400, 320, 240, xi, 0, 0, 0, 0}, 640, 480); };
+  EXPECT_TRUE(in_range(lens(1)));
+  EXPECT_FALSE(in_range(lens(-0.5)));
+}
+
 }  // namespace fbvins
