@@ -199,5 +199,19 @@ TEST(Doctor, GivesTheCorrectedLine) {
   EXPECT_NEAR(std::stod(finding->corrected.substr(at + 19)), 0.05, 1e-3);
 }
 
+TEST(Doctor, NoOffsetIsOfferedForStampsThatVary) {
+  Evidence evidence = good();
+  for (ImuSample& sample : evidence.imu) sample.t = sample.t + Duration::from_seconds(0.05);
+  for (std::size_t i = 0; i < evidence.stamps.size(); i += 3)
+    evidence.stamps[i] = evidence.stamps[i] + Duration::from_seconds(0.012);
+  const Diagnosis diagnosis = examine(evidence);
+  ASSERT_NE(find(diagnosis, FindingKind::image_stamps), nullptr) << all_of(diagnosis);
+  const Finding* finding = find(diagnosis, FindingKind::time_offset);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_TRUE(finding->fields.empty());
+  EXPECT_TRUE(finding->corrected.empty()) << finding->corrected;
+  EXPECT_EQ(diagnosis.rig.time_offset_s, evidence.rig.time_offset_s);
+}
+
 }  // namespace doctor_test
 }  // namespace fbvins

@@ -248,6 +248,11 @@ void Examination::time_offset(const MotionFit& fit) {
                                  finding.size > 0 ? "late against" : "ahead of");
   finding.expected = fmt::format("{:.1f} ms by the calibration (t_imu = t_image + {:.5f} s)", 1e3 * evidence_.rig.time_offset_s,
                                  evidence_.rig.time_offset_s);
+  if (has(FindingKind::image_stamps)) {  // an offset of the mean delay: with it a flight may be worse than without
+    finding.advice =
+        "stamp the images at the moment of exposure, and examine a new recording: no offset corrects stamps that vary";
+    return;
+  }
   finding.advice = "stamp both at the moment of measuring, or give the offset to the calibration";
   finding.fields = {CalibrationField::time_offset};
   rig_.time_offset_s = fit.offset_s;
