@@ -30,6 +30,8 @@ constexpr std::size_t kFewestPairs = 8, kFewestWindows = 4;
 /// The accelerometer is judged only where its readings leave less than this share of the seen acceleration unexplained.
 constexpr double kMostUnexplained = 0.5;
 constexpr double kLeastAcceleration_mps2 = 0.15;
+/// Other axes must leave less than half of what the delivered ones leave, and so much less of the acceleration.
+constexpr double kAxesLeave = 0.02;
 
 /// Preintegrated readings of a pair: delta_q, and delta_v and delta_p as linear functions of matrix and bias.
 struct PairDeltas {
@@ -232,11 +234,13 @@ AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries&
     for (std::size_t k = w.first; k < w.last; ++k)
       deltas[k] = deltas_of(imu.segment(pairs[k].a + offset, pairs[k].b + offset), rig.imu_noise, start.gyro_bias_radps);
   Summed sums = sum_up(windows, pairs, deltas, rig.T_BC0, 1);
-  Explained best;
+  const Explained as_named = explained_by(Mat3::Identity(), sums.all);
+  Explained best = as_named;
   for (const Mat3& axes : signed_permutations()) {
     const Explained one = explained_by(axes, sums.all);
     if (one.unexplained < best.unexplained) best = one, fit.axes = axes;
   }
+  if (as_named.unexplained <= 2 * best.unexplained + kAxesLeave) best = as_named, fit.axes.setIdentity();
   if (best.scale > 0) sums = sum_up(windows, pairs, deltas, rig.T_BC0, best.scale);  // the lever arm is in metres of the readings
   best = explained_by(fit.axes, sums.all);
   fit.unexplained = best.unexplained;

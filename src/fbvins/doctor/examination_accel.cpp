@@ -22,10 +22,10 @@ using doctor::kSignificant;
 constexpr double kDelayStep_s = 0.02, kDelayPractical_s = 0.015, kDelayLeaves = 0.7;
 constexpr int kDelaySteps = 4;
 constexpr double kScalePractical = 0.03, kPositionPractical_m = 0.05, kBiasPractical_mps2 = 1;
+/// Gravity may be farther off by this without a bias than with it.
+constexpr double kBiasSpares_mps2 = 0.2;
 /// Significance that the images' scale needs where gravity, as the accelerometer reads it, is off by the same factor.
 constexpr double kConfirmed = 3;
-/// Other axes must leave less than half of what the delivered ones leave, and so much less of the acceleration.
-constexpr double kAxesLeave = 0.02;
 /// Gravity must be nearer to one cause's than to another's by this share.
 constexpr double kGravityTells = 0.01;
 /// How much nearer the place that turned with the IMU must be than that as given, in standard deviations, and the least of those.
@@ -97,7 +97,6 @@ void Examination::accelerations() {
       100 * fit.lever_sigma_m.x(), 100 * fit.lever_m.y(), 100 * fit.lever_sigma_m.y(), 100 * fit.lever_m.z(),
       100 * fit.lever_sigma_m.z(), 100 * fit.unexplained_elsewhere));
   if (fit.axes != Mat3::Identity()) {
-    if (!(fit.unexplained_as_named > 2 * fit.unexplained + kAxesLeave)) return;
     accel_axes(fit);
   } else if (position(fit)) {  // which changes the rest
     fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
@@ -157,6 +156,15 @@ void Examination::accel_bias(const AccelFit& fit) {
   const Vec3& bias = fit.bias;
   const double sigma = fit.bias_sigma.maxCoeff();
   if (bias.norm() < kBiasPractical_mps2 || bias.norm() < kSignificant * sigma) return;
+  // What is left of gravity without a bias is nearer to gravity. A rig that turns little shows a bias only as a tilt.
+  std::vector<ImuSample> without = evidence_.imu;
+  for (ImuSample& sample : without) sample.accel_mps2 = accel_unit_ * sample.accel_mps2 - bias;
+  const auto gravity_off = [](const GravitySeen& g) { return std::abs(g.norm_mps2 - kGravity_mps2); };
+  const double off_mps2 = gravity_off({accel_unit_ * gravity_seen(evidence_.imu).norm_mps2, 0});
+  if (gravity_off(gravity_seen(without)) > off_mps2 + kBiasSpares_mps2) {
+    not_judged("the accelerometer's bias: what the images show of it does not go with the gravity that it reads");
+    return;
+  }
   Finding& finding = found(FindingKind::accel_bias, bias.norm(), sigma, "m/s^2");
   finding.measured = fmt::format("the accelerometer's bias is ({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", bias.x(), bias.y(),
                                  bias.z(), finding.sigma);
