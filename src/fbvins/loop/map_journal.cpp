@@ -286,9 +286,11 @@ std::string journal_of(const std::string& path) { return path + ".journal"; }
 
 Result<void> write_journal(const std::string& path, std::string_view news) {
   if (!news.starts_with(kJournalName)) return append_to_file(journal_of(path), news);
-  if (Result<void> done = write_file_atomically(journal_of(path), news); !done) return done;
+  // The file first: a journal alone, left by a program that was killed, belongs to nothing.
   std::error_code unknown;
-  return std::filesystem::exists(path, unknown) ? Result<void>() : write_file_atomically(path, serialise_map(PlaceMap{}));
+  if (!std::filesystem::exists(path, unknown))
+    if (Result<void> done = write_file_atomically(path, serialise_map(PlaceMap{})); !done) return done;
+  return write_file_atomically(journal_of(path), news);
 }
 
 void remove_journal(const std::string& path) { (void)::unlink(journal_of(path).c_str()); }
