@@ -22,7 +22,7 @@ struct AccelStart {
 struct AccelFit {
   bool seen = false;                  ///< the rig accelerated enough, and the readings explain it
   double scale = 1, scale_sigma = 0;  ///< seen over measured acceleration, with the axes below
-  Mat3 axes = Mat3::Identity();       ///< signed permutation that fits clearly better than as delivered: f_B = axes * reading
+  Mat3 axes = Mat3::Identity();       ///< signed permutation, f_B = axes * reading; not the identity where it fits clearly better
   double unexplained = 0;             ///< share of the seen acceleration (mean square) that the readings do not explain
   double unexplained_as_named = 0;    ///< the same with the axes as delivered
   double gravity_mps2 = 0, gravity_sigma_mps2 = 0;  ///< in metres of the cameras: that of a baseline which is too long is larger

@@ -156,12 +156,13 @@ void Examination::accel_bias(const AccelFit& fit) {
   const Vec3& bias = fit.bias;
   const double sigma = fit.bias_sigma.maxCoeff();
   if (bias.norm() < kBiasPractical_mps2 || bias.norm() < kSignificant * sigma) return;
-  // What is left of gravity without a bias is nearer to gravity. A rig that turns little shows a bias only as a tilt.
-  std::vector<ImuSample> without = evidence_.imu;
-  for (ImuSample& sample : without) sample.accel_mps2 = accel_unit_ * sample.accel_mps2 - bias;
-  const auto gravity_off = [](const GravitySeen& g) { return std::abs(g.norm_mps2 - kGravity_mps2); };
-  const double off_mps2 = gravity_off({accel_unit_ * gravity_seen(evidence_.imu).norm_mps2, 0});
-  if (gravity_off(gravity_seen(without)) > off_mps2 + kBiasSpares_mps2) {
+  // Without its bias an accelerometer reads gravity better. A rig that turns little hardly tells a bias from gravity.
+  const auto gravity_error = [&](const Vec3& without) {
+    std::vector<ImuSample> samples = evidence_.imu;
+    for (ImuSample& sample : samples) sample.accel_mps2 = accel_unit_ * sample.accel_mps2 - without;
+    return std::abs(gravity_seen(samples).norm_mps2 - kGravity_mps2);
+  };
+  if (gravity_error(bias) > gravity_error(Vec3::Zero()) + kBiasSpares_mps2) {
     not_judged("the accelerometer's bias: what the images show of it does not go with the gravity that it reads");
     return;
   }
