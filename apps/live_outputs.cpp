@@ -79,6 +79,8 @@ Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, L
   } else if (!arguments.quiet) {
     live.add_sink(std::make_unique<StatusSink>(stdout));
   }
+  if (!arguments.mavlink.empty() && flight.config.live.mavlink.mounting.local_frame == LocalOrigin::map && !flight.map.wanted())
+    return Error{ErrorCode::invalid_argument, "live.mavlink.mounting.local_frame=map needs a map: --map FILE, or --loop"};
   for (const std::string& address : arguments.mavlink) {
     auto sink = MavlinkSink::create(address, flight.config.live.mavlink);
     if (!sink) return sink.error();

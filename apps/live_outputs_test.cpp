@@ -78,6 +78,11 @@ TEST_F(LiveOutputs, AWrongCommandLineIsAnError) {
   arguments.mavlink = {"nonsense"};
   LiveSystem flight = live();
   EXPECT_FALSE(add_to(flight));
+  arguments.mavlink = {"udp:127.0.0.1:9:0"};
+  config.live.mavlink.mounting.local_frame = LocalOrigin::map;
+  const Result<void> without_map = add_to(flight);
+  ASSERT_FALSE(without_map);
+  EXPECT_NE(without_map.error().message.find("needs a map"), std::string::npos);
 }
 
 TEST_F(LiveOutputs, FilesAreThoseOfARun) {

@@ -13,8 +13,9 @@ enum class ImuAxes {
 };
 
 /// vehicle: x ahead of the vehicle at the start; after a restart the frame continues where the vehicle was last seen.
-/// world: W turned by 180 degrees about its x.
-enum class LocalOrigin { vehicle, world };
+/// world: W turned by 180 degrees about its x. map: M turned so (FlownMap);
+/// before the vehicle is found in it, as world, and after a restart as vehicle.
+enum class LocalOrigin { vehicle, world, map };
 
 struct MountingOptions {
   ImuAxes imu_axes = ImuAxes::flu;
@@ -31,8 +32,8 @@ struct MountingOptions {
     v("x_m", x_m, "m", "the IMU's position on the vehicle, forward", -10.0, 10.0);
     v("y_m", y_m, "m", "the IMU's position on the vehicle, right", -10.0, 10.0);
     v("z_m", z_m, "m", "the IMU's position on the vehicle, down", -10.0, 10.0);
-    v("local_frame", local_frame, "vehicle|world",
-      "x ahead of the vehicle at the start, continued after a restart; or W with z down");
+    v("local_frame", local_frame, "vehicle|world|map",
+      "x ahead of the vehicle at the start, continued after a restart; or W, or the map's M, with z down");
   }
 };
 

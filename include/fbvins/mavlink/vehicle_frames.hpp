@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/mavlink/flown_map.hpp"
 #include "fbvins/mavlink/messages.hpp"
 #include "fbvins/mavlink/mounting_options.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -31,7 +32,7 @@ struct VehicleState {
   Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in L [m], dtheta in L [rad])
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_LF_F
   Health health;
-  std::uint32_t reset_counter = 0;
+  std::uint32_t reset_counter = 0;  ///< of the odometry; with LocalOrigin::map plus FlownMap::jumps()
 };
 
 class VehicleFrames {
@@ -40,6 +41,10 @@ class VehicleFrames {
   /// None without a pose, or with numbers that are not finite. At a reset a flight controller takes over position and heading:
   /// the less they jump, the less its filter is disturbed (LocalOrigin::vehicle).
   std::optional<VehicleState> state(const Odometry& odometry);
+  /// Where M is; has an effect with LocalOrigin::map alone.
+  void take(const MapUpdate& update);
+  /// A counter of the odometry, as VehicleState has it.
+  std::uint32_t reset_counter(std::uint32_t odometrys) const { return odometrys + map_.jumps(); }
 
  private:
   void begin(const Pose<W, BodyFrd>& T_WF);
@@ -47,6 +52,7 @@ class VehicleFrames {
   LocalOrigin origin_;
   Pose<B, BodyFrd> T_BF_;
   Pose<LocalFrd, W> T_LW_;
+  FlownMap map_;
   std::optional<std::uint32_t> reset_counter_;
   std::optional<Pose<LocalFrd, BodyFrd>> last_;
 };

@@ -95,8 +95,8 @@ void MavlinkSession::say_pose(const LivePose& pose, std::uint64_t t_usec, Frames
 
 OdometryMessage MavlinkSession::odometry_for_px4(const LivePose& pose, const std::optional<VehicleState>& state,
                                                  std::uint64_t t_usec) const {
-  OdometryMessage message =
-      state ? odometry_message(*state, t_usec) : no_odometry_message(pose.health, pose.reset_counter, t_usec);
+  OdometryMessage message = state ? odometry_message(*state, t_usec)
+                                  : no_odometry_message(pose.health, frames_.reset_counter(pose.reset_counter), t_usec);
   if (options_.frame == MavlinkFrameId::local_ned) message.frame_id = kMavFrameLocalNed;
   return message;
 }

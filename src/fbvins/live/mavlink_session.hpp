@@ -36,6 +36,8 @@ class MavlinkSession {
   /// Nothing where the flight controller's clock is not sure (MavlinkClock).
   Frames take(const LivePose& pose);
   Frames take(const LiveStatus& status, Time now);
+  /// Where M is, for poses in it (LocalOrigin::map).
+  void take(const MapUpdate& update) { frames_.take(update); }
   Frames receive(std::span<const std::uint8_t> bytes, Time now);
   /// What is due: heartbeats, TIMESYNC requests, a change of health.
   Frames tick(Time now);

@@ -43,9 +43,20 @@ Result<std::unique_ptr<MavlinkSigner>> make_signer(const std::string& key_file, 
   return std::make_unique<MavlinkSigner>(*key, first);
 }
 
+/// Without all keyframes of the map.
+MapUpdate where_M_is(const MapUpdate& update) {
+  return {.localised = update.localised,
+          .found = update.found,
+          .T_MW_smooth = update.T_MW_smooth,
+          .anchored = update.anchored,
+          .M_moved = update.M_moved,
+          .reset_counter = update.reset_counter};
+}
+
 }  // namespace
 
 struct MavlinkSink::Impl {
+  using Event = std::variant<LivePose, LiveStatus, MapUpdate>;
   Impl(const std::string& address, LinkAddress link_address, const MavlinkOptions& options, SigningTime time,
        std::unique_ptr<MavlinkSigner> signer)
       : name(fmt::format("mavlink {}", address)),
@@ -82,7 +93,7 @@ struct MavlinkSink::Impl {
   const WakeEvent wake;
   std::atomic<bool> ending{false};
   std::mutex mutex;  // guards what follows, but for the thread
-  std::deque<std::variant<LivePose, LiveStatus>> waiting;
+  std::deque<Event> waiting;
   std::int64_t overrun = 0;
   MavlinkLinkState state;
   std::thread worker;  // last: starts when everything else exists
@@ -153,14 +164,15 @@ void MavlinkSink::Impl::work() {
   for (bool last = false; !last;) {
     last = ending;  // what was taken before the end is still sent
     keep_open(host_now());
-    std::deque<std::variant<LivePose, LiveStatus>> events;
+    std::deque<Event> events;
     {
       const std::lock_guard lock(mutex);
       events.swap(waiting);
     }
     for (const auto& event : events) {
       if (const auto* pose = std::get_if<LivePose>(&event)) send(session.take(*pose));
-      else send(session.take(std::get<LiveStatus>(event), host_now()));
+      else if (const auto* status = std::get_if<LiveStatus>(&event)) send(session.take(*status, host_now()));
+      else session.take(std::get<MapUpdate>(event));
     }
     link.flush();
     const std::vector<std::uint8_t> bytes = link.receive();
@@ -196,6 +208,7 @@ Result<void> MavlinkSink::take(const LiveEvent& event) {
   const std::lock_guard lock(impl_->mutex);
   if (const auto* pose = std::get_if<LivePose>(&event)) impl_->waiting.emplace_back(*pose);
   else if (const auto* status = std::get_if<LiveStatus>(&event)) impl_->waiting.emplace_back(*status);
+  else if (const auto* update = std::get_if<MapUpdate>(&event)) impl_->waiting.emplace_back(where_M_is(*update));
   else return {};
   if (impl_->waiting.size() > kWaiting) impl_->waiting.pop_front(), ++impl_->overrun;
   impl_->wake.signal();

@@ -226,6 +226,23 @@ TEST(MavlinkSink, WhatWasTakenBeforeTheEndIsSent) {
   EXPECT_EQ(px4.end.newest_reset, 4);
 }
 
+TEST(MavlinkSink, PosesInMHaveTheJumpsOfTheMap) {
+  UdpEnd px4;
+  MavlinkOptions options = own_clock();
+  options.mounting.local_frame = LocalOrigin::map;
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}:0", px4.bind_any()), options);
+  MapUpdate found;
+  found.localised = found.found = true;
+  found.reset_counter = 4;
+  EXPECT_TRUE((*sink)->take(LiveEvent(pose(0, 4))));
+  EXPECT_TRUE((*sink)->take(LiveEvent(found)));
+  EXPECT_TRUE((*sink)->take(LiveEvent(pose(1, 4))));
+  EXPECT_TRUE((*sink)->finish());
+  px4.serve();
+  EXPECT_EQ(px4.end.odometries, 2);
+  EXPECT_EQ(px4.end.newest_reset, 5);
+}
+
 /// A serial cable: a pseudo-terminal under a name that stays.
 struct Cable {
   std::filesystem::path folder;

@@ -50,8 +50,11 @@ Result<void> ResetCounterSink::keep(std::uint32_t counter) {
 
 Result<void> ResetCounterSink::take(const LiveEvent& event) {
   if (!first_kept_) return std::exchange(first_kept_, {});
+  if (const auto* update = std::get_if<MapUpdate>(&event)) map_.take(*update);
   const auto* pose = std::get_if<LivePose>(&event);
-  return pose && pose->reset_counter != kept_ ? keep(pose->reset_counter) : Result<void>{};
+  if (!pose) return {};
+  const std::uint32_t published = pose->reset_counter + map_.jumps();
+  return published != kept_ ? keep(published) : Result<void>{};
 }
 
 }  // namespace fbvins

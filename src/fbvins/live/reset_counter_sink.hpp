@@ -12,11 +12,13 @@
 
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/live/sink.hpp"
+#include "fbvins/mavlink/flown_map.hpp"
 
 namespace fbvins {
 
-/// The file holds the newest counter that was published: it is written before the first pose, and after each restart of the
-/// estimator. One that cannot be written is reported as the sink's error.
+/// The file holds the newest counter that was published, with the jumps of M (FlownMap), which MAVLink adds to it where poses are
+/// in M: it is written before the first pose, and after each restart of the estimator and each jump. One that cannot be written
+/// is reported as the sink's error.
 class ResetCounterSink final : public Sink {
  public:
   explicit ResetCounterSink(std::string file, WriteFile write = write_file_atomically);
@@ -34,6 +36,7 @@ class ResetCounterSink final : public Sink {
   WriteFile write_;
   bool unreadable_ = false;
   std::uint32_t first_ = 0, kept_ = 0;
+  FlownMap map_;
   Result<void> first_kept_;
 };
 

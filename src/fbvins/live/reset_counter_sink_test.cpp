@@ -34,6 +34,17 @@ TEST_F(ResetCounter, RestartsOfTheEstimatorCount) {
   EXPECT_EQ(ResetCounterSink(file_).first(), 3u) << "the process that ended had published 2";
 }
 
+TEST_F(ResetCounter, JumpsOfMCountAsMavlinkCountsThem) {
+  {
+    ResetCounterSink sink(file_);
+    MapUpdate update;
+    update.localised = update.found = true;
+    ASSERT_TRUE(sink.take(update));
+    ASSERT_TRUE(sink.take(pose(0)));
+  }
+  EXPECT_EQ(ResetCounterSink(file_).first(), 2u) << "poses in M had 1";
+}
+
 TEST_F(ResetCounter, StaysWithinTheEightBitsOfMavlink) {
   std::ofstream(file_) << "255\n";
   EXPECT_EQ(ResetCounterSink(file_).first(), 0u);

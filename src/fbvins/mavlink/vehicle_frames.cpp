@@ -53,10 +53,14 @@ VehicleFrames::VehicleFrames(const MountingOptions& options)
 
 /// Places the local frame in a new W.
 void VehicleFrames::begin(const Pose<W, BodyFrd>& T_WF) {
-  if (origin_ == LocalOrigin::world) return;
+  if (origin_ == LocalOrigin::world || (origin_ == LocalOrigin::map && !last_)) return;
   const double wanted_rad = last_ ? heading_rad(last_->q) : 0.0;
   T_LW_.q = so3_exp(Vec3(0, 0, wanted_rad - heading_rad(kHalfTurnAboutX * T_WF.q))) * kHalfTurnAboutX;
   if (last_) T_LW_.p = last_->p - T_LW_.q * T_WF.p;
+}
+
+void VehicleFrames::take(const MapUpdate& update) {
+  if (origin_ == LocalOrigin::map) map_.take(update);
 }
 
 std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
@@ -68,6 +72,7 @@ std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
     reset_counter_ = odometry.reset_counter;
     begin(at.T_WX);
   }
+  if (const auto T_MW = map_.T_MW(odometry.reset_counter)) T_LW_ = Pose<LocalFrd, M>{kHalfTurnAboutX, Vec3::Zero()} * *T_MW;
 
   const Mat3 R_LW = T_LW_.R(), R_FW = at.T_WX.R().transpose();
   VehicleState state;
@@ -81,7 +86,7 @@ std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
   state.pose_covariance = to_L * at.pose_covariance * to_L.transpose();
   state.velocity_covariance = R_FW * at.velocity_covariance * R_FW.transpose();
   state.health = odometry.health;
-  state.reset_counter = odometry.reset_counter;
+  state.reset_counter = reset_counter(odometry.reset_counter);
   return state;
 }
 

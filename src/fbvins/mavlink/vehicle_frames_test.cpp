@@ -226,5 +226,91 @@ TEST(VehicleMessages, HealthIsASentenceThatFits) {
   EXPECT_EQ(status_text(MavSeverity::info, std::string(80, 'x')).text[49], 'x');
 }
 
+MapUpdate m_is_at(const Pose<M, W>& T_MW_smooth, std::uint32_t reset_counter = 0) {
+  MapUpdate update;
+  update.localised = true;
+  update.T_MW_smooth = T_MW_smooth;
+  update.reset_counter = reset_counter;
+  return update;
+}
+
+MountingOptions in_map() {
+  MountingOptions options;
+  options.local_frame = LocalOrigin::map;
+  return options;
+}
+
+Pose<M, W> somewhere() { return {so3_exp(Vec3(0, 0, 0.3)), Vec3(2, -1, 0.5)}; }
+
+/// With M's z down; the mounting is turned by half a turn about x.
+void expect_at(const VehicleState& state, const Pose<M, B>& T_MB) {
+  EXPECT_LT((state.T_LF.p - Vec3(T_MB.p.x(), -T_MB.p.y(), -T_MB.p.z())).norm(), 1e-12);
+  const Quat q_LF = Quat(0, 1, 0, 0) * T_MB.q * mounting(in_map()).inverse().q;
+  EXPECT_LT(so3_log(q_LF.conjugate() * state.T_LF.q).norm(), 1e-12);
+}
+
+TEST(VehicleFrames, InMPosesFollowIt) {
+  VehicleFrames frames(in_map());
+  Rng rng(8);
+  Odometry o = anywhere(rng);
+  expect_at(*frames.state(o), Pose<M, W>{} * o.T_WB);
+  const double before = frames.state(o)->pose_covariance.norm();
+  for (int i = 1; i < 4; ++i) {  // by small corrections
+    const Pose<M, W> T_MW{so3_exp(Vec3(0, 0, 0.001 * i)), Vec3(0.01 * i, 0, 0)};
+    frames.take(m_is_at(T_MW));
+    const VehicleState state = *frames.state(o);
+    expect_at(state, T_MW * o.T_WB);
+    EXPECT_EQ(state.reset_counter, 0u);
+    EXPECT_NEAR(state.pose_covariance.norm(), before, 1e-9);
+  }
+  VehicleFrames in_w({});
+  const Pose<LocalFrd, BodyFrd> here = in_w.state(o)->T_LF;
+  in_w.take(m_is_at(somewhere()));
+  EXPECT_EQ(in_w.state(o)->T_LF.p, here.p) << "who flies in W is not moved";
+}
+
+TEST(VehicleFrames, AJumpOfMIsToldByTheCounter) {
+  VehicleFrames frames(in_map());
+  Rng rng(9);
+  Odometry o = anywhere(rng);
+  ASSERT_TRUE(frames.state(o));
+  MapUpdate unknown;
+  frames.take(unknown);  // a loaded map, in which the flight is not found yet
+  expect_at(*frames.state(o), Pose<M, W>{} * o.T_WB);
+  MapUpdate found = m_is_at(somewhere());
+  found.found = true;
+  frames.take(found);
+  expect_at(*frames.state(o), somewhere() * o.T_WB);
+  EXPECT_EQ(frames.state(o)->reset_counter, 1u);
+  MapUpdate levelled = m_is_at(somewhere());
+  levelled.M_moved = Pose<M, M>{so3_exp(Vec3(0.01, 0, 0)), Vec3::Zero()};  // T_MW_smooth has no part in that
+  frames.take(levelled);
+  EXPECT_EQ(frames.state(o)->reset_counter, 1u);
+  MapUpdate anchored = m_is_at({so3_exp(Vec3(0, 0, 2)), Vec3(20, 30, 0)});
+  anchored.M_moved = Pose<M, M>{};
+  anchored.anchored = true;
+  frames.take(anchored);
+  EXPECT_EQ(frames.state(o)->reset_counter, 2u);
+  expect_at(*frames.state(o), anchored.T_MW_smooth * o.T_WB);
+}
+
+TEST(VehicleFrames, InMARestartGoesOnWhereTheVehicleWasUntilItIsFound) {
+  VehicleFrames frames(in_map());
+  Rng rng(10);
+  Odometry o = anywhere(rng);
+  frames.take(m_is_at(somewhere()));
+  const VehicleState before = *frames.state(o);
+  o.T_WB = Pose<W, W>(so3_exp(Vec3(0, 0, 0.4)), Vec3(5, 5, 5)) * o.T_WB;
+  o.reset_counter = 1;
+  const VehicleState after = *frames.state(o);
+  EXPECT_EQ(after.reset_counter, 1u);
+  EXPECT_LT((after.T_LF.p - before.T_LF.p).norm(), 1e-9);
+  frames.take(m_is_at(Pose<M, W>{}, 0));  // late, of the W that has ended
+  EXPECT_LT((frames.state(o)->T_LF.p - before.T_LF.p).norm(), 1e-9);
+  frames.take(m_is_at(somewhere(), 1));
+  EXPECT_EQ(frames.state(o)->reset_counter, 2u);
+  expect_at(*frames.state(o), somewhere() * o.T_WB);
+}
+
 }  // namespace vehicle_frames_test
 }  // namespace fbvins
