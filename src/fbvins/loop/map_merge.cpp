@@ -22,17 +22,22 @@ constexpr std::size_t kMostAsked = 300, kAgree = 3, kEnough = 8;
 constexpr double kAgree_m = 0.3, kAgree_rad = 3 * kDegree;
 /// Once that is known, places are recognised around their predicted pose, which is as uncertain as this.
 constexpr double kKnown_m = 0.3, kKnown_px = 40;
+/// Of the second map's keyframes; with more it has little of its own.
+constexpr double kMostInBoth = 0.5;
 
 /// Keyframes of `second` with a keyframe of `first` of the same image: of the same stamp, with the same features.
-std::size_t keyframes_in_both(const PlaceMap& first, const PlaceMap& second) {
+std::vector<KeyframeId> keyframes_in_both(const PlaceMap& first, const PlaceMap& second) {
   std::multimap<Time, const Place*> of_first;
   for (const MapKeyframe& k : first.keyframes()) of_first.emplace(k.t, &k.place);
-  return static_cast<std::size_t>(std::ranges::count_if(second.keyframes(), [&](const MapKeyframe& k) {
+  std::vector<KeyframeId> both;
+  for (const MapKeyframe& k : second.keyframes()) {
     const auto [begin, end] = of_first.equal_range(k.t);
-    return std::any_of(begin, end, [&](const auto& other) {
-      return other.second->features == k.place.features && other.second->descriptors == k.place.descriptors;
-    });
-  }));
+    if (std::any_of(begin, end, [&](const auto& other) {
+          return other.second->features == k.place.features && other.second->descriptors == k.place.descriptors;
+        }))
+      both.push_back(k.id);
+  }
+  return both;
 }
 
 /// A place of the first map, seen by a keyframe of the second.
@@ -177,10 +182,11 @@ void thin(PlaceMap& map, std::uint32_t first_session, const LoopOptions& options
 Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& other, const LoopOptions& options, const Vocabulary& vocabulary) {
   const auto refuse = [](std::string why) { return Error{ErrorCode::invalid_argument, std::move(why)}; };
   if (first.boosted != other.boosted) return refuse("one map holds boosted descriptors, the other raw ones");
-  if (const std::size_t both = keyframes_in_both(first, other); both > 0)
-    return refuse(
-        fmt::format("{} of its {} keyframes are in the other map already: they would be there twice", both, other.size()));
   PlaceMap second = other;
+  const std::vector<KeyframeId> both = keyframes_in_both(first, second);
+  if (both.size() > kMostInBoth * static_cast<double>(second.size()))
+    return refuse(fmt::format("{} of its {} keyframes are in the other map already", both.size(), second.size()));
+  for (const KeyframeId id : both) second.remove(id);  // where recordings of one flight overlap
   change_body(second, first.T_BC0);
   for (PlaceMap* map : {&first, &second}) {
     std::erase_if(map->keyframes(), [](const MapKeyframe& k) { return !k.placed; });

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
 
@@ -35,12 +37,29 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   EXPECT_EQ(serialise_map(*from_file), serialise_map(*both));
   const auto twice = merge_maps(a, a, {}, vocabulary());
   ASSERT_FALSE(twice.ok()) << "a map merged with itself";
-  EXPECT_EQ(twice.error().message,
-            fmt::format("{0} of its {0} keyframes are in the other map already: they would be there twice", a.size()));
+  EXPECT_EQ(twice.error().message, fmt::format("{0} of its {0} keyframes are in the other map already", a.size()));
   EXPECT_FALSE(merge_maps(*both, b, {}, vocabulary()).ok()) << "a part of itself";
   PlaceMap boosted = b;
   boosted.boosted = true;
   EXPECT_FALSE(merge_maps(a, boosted, {}, vocabulary()).ok()) << "descriptors of two kinds do not compare";
+}
+
+TEST(MergeMaps, PartsOfOneFlightMayOverlap) {
+  const std::vector<Frame> frames = flight(room(1), 170, 0.001, 0.01, 2, 0);
+  const auto part = [&](std::size_t begin, std::size_t end) {
+    LoopCloser closer(rig(), {}, vocabulary());
+    for (std::size_t i = begin; i < end; ++i)
+      closer.process(frames[i].place, keyframe(FrameId{frames[i].t.ns / 1000}, frames[i].t, frames[i].odometry));
+    closer.finish();
+    return closer.map();
+  };
+  const PlaceMap a = part(0, 100), b = part(80, 170);
+  const auto both = merge_maps(a, b, {}, vocabulary());
+  ASSERT_TRUE(both.ok()) << both.error().message;
+  EXPECT_EQ(both->size(), a.size() + b.size() - 20);
+  std::set<std::int64_t> stamps;
+  for (const MapKeyframe& k : both->keyframes()) EXPECT_TRUE(stamps.insert(k.t.ns).second) << "a keyframe is there twice";
+  EXPECT_FALSE(merge_maps(a, part(0, 60), {}, vocabulary()).ok()) << "nothing of its own";
 }
 
 }  // namespace map_merge_test
