@@ -8,6 +8,7 @@
 
 #include "fbvins/loop/anchored_flight.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_merge.hpp"
 #include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/map_tags.hpp"
 
@@ -151,6 +152,37 @@ TEST(TagLandmarks, OfATagTheNewestTwelvePassesAreKept) {
   ASSERT_EQ(map.tags.size(), 12u);
   EXPECT_TRUE(std::ranges::all_of(map.tags, [](const MapTag& t) { return t.covariance.isIdentity(); })) << "the most certain";
   EXPECT_EQ(map.tags.back().keyframe, KeyframeId{97});
+}
+
+/// The map of a flight that recognises nothing but tags, in a frame of its own.
+PlaceMap blind_map(std::uint64_t seed, double start_s, const Pose<G, G>& gauge, bool one_tag = false) {
+  LoopCloser closer(rig(), {}, vocabulary());
+  Rng rng(seed);
+  for (const Frame& f : blind(flight(room(1), 120, 0.001, 0.01, seed, start_s))) {
+    Keyframe k = keyframe(FrameId{f.t.ns / 1000}, f.t, gauge * f.odometry);
+    k.anchors = landmarks(f, rng);
+    if (one_tag) std::erase_if(k.anchors, [&](const Anchor& a) { return std::get<TagAnchor>(a).id != 0; });
+    closer.process(f.place, k);
+  }
+  closer.finish();
+  return closer.map();
+}
+
+TEST(TagLandmarks, MapsThatHaveNothingElseInCommonAreJoinedByThem) {
+  const PlaceMap a = blind_map(2, 0, kSame), b = blind_map(9, 7.3, kElsewhere);
+  const Result<PlaceMap> both = merge_maps(a, b, {}, vocabulary());
+  ASSERT_TRUE(both.ok()) << both.error().message;
+  const auto truth_b = flight(room(1), 120, 0, 0, 9, 7.3);
+  ASSERT_EQ(both->size(), a.size() + b.size());
+  double worst_m = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    const MapKeyframe& k = both->keyframes()[a.size() + i];
+    const auto f = std::ranges::find(truth_b, b.keyframes()[i].t, &Frame::t);
+    worst_m = std::max(worst_m, (k.T_MB.p - f->truth.p).norm());
+  }
+  EXPECT_LT(worst_m, 0.15);
+  EXPECT_FALSE(merge_maps(a, blind_map(9, 7.3, kElsewhere, true), {}, vocabulary()).ok())
+      << "one number may hang in two buildings";
 }
 
 }  // namespace loop_closer_tags_test

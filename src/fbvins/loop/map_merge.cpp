@@ -10,6 +10,7 @@
 #include "fbvins/loop/map_consistency.hpp"
 #include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_sessions.hpp"
+#include "fbvins/loop/map_tags.hpp"
 #include "fbvins/loop/map_upkeep.hpp"
 
 namespace fbvins {
@@ -18,6 +19,8 @@ namespace {
 /// Keyframes of the second map that are looked for anywhere in the first: of more, evenly so many. So many that agree are needed;
 /// with more, no others are looked for.
 constexpr std::size_t kMostAsked = 300, kAgree = 3, kEnough = 8;
+/// Or so many tags by their numbers: one number may hang in two buildings.
+constexpr std::size_t kAgreeingTags = 2;
 /// Largest difference of two recognised places that agree on where the second map lies.
 constexpr double kAgree_m = 0.3, kAgree_rad = 3 * kDegree;
 /// Once that is known, places are recognised around their predicted pose, which is as uncertain as this.
@@ -40,12 +43,13 @@ std::vector<KeyframeId> keyframes_in_both(const PlaceMap& first, const PlaceMap&
   return both;
 }
 
-/// A place of the first map, seen by a keyframe of the second.
+/// A place or a tag of the first map, seen by a keyframe of the second.
 struct Tie {
   MapEdge edge;  ///< from the first's keyframe to the second's, under its number there
   Vec3 p_M2;     ///< of the second's keyframe
   Vec3 p_M1;     ///< where the tie puts it
   Pose<M, M> T_M1_M2;
+  std::optional<int> tag;  ///< its number
 
   bool agrees(const Pose<M, M>& T) const {
     return (T * p_M2 - p_M1).norm() < kAgree_m && angle_between(T.q, T_M1_M2.q) < kAgree_rad;
@@ -63,12 +67,14 @@ class Merge {
     for (const MapKeyframe& k : first.keyframes()) search_.add(k.id, k.place.words);
   }
 
-  /// Where the second map lies in the first, by the most places that agree.
+  /// Where the second map lies in the first, by the most places and tags that agree.
   std::optional<Pose<M, M>> find() {
     const std::size_t count = second_.size(), asked = std::min(count, kMostAsked);
-    std::vector<Tie> ties;
+    std::vector<Tie> ties = tag_ties();
     std::size_t most = 0;
     std::optional<Pose<M, M>> best;
+    for (const Tie& hypothesis : ties)
+      if (const std::size_t n = supporters(ties, hypothesis.T_M1_M2); n > most) most = n, best = hypothesis.T_M1_M2;
     for (std::size_t i = 0; i < asked && most < kEnough; ++i) {
       MapKeyframe query = second_.keyframes()[i * count / asked];
       query.session = kNoSession;
@@ -80,12 +86,14 @@ class Merge {
       for (const Tie& hypothesis : ties)
         if (const std::size_t n = supporters(ties, hypothesis.T_M1_M2); n > most) most = n, best = hypothesis.T_M1_M2;
     }
-    return most >= kAgree ? best : std::nullopt;
+    return best && (most >= kAgree || agreeing_tags(ties, *best) >= kAgreeingTags) ? best : std::nullopt;
   }
 
-  /// Places that both know, around where they should be.
+  /// Tags and places that both know, these around where they should be.
   std::vector<MapEdge> ties(const Pose<M, M>& T_M1_M2) {
     std::vector<MapEdge> out;
+    for (Tie& tie : tag_ties())
+      if (tie.agrees(T_M1_M2)) out.push_back(std::move(tie.edge));
     for (const MapKeyframe& k : second_.keyframes()) {
       MapKeyframe query = k;
       query.session = kNoSession;
@@ -107,9 +115,32 @@ class Merge {
   Tie tie_of(const MapKeyframe& known, const MapKeyframe& query, const VerifiedPose& verified) const {
     MapEdge edge = loop_edge(first_.T_BC0, known.id, verified.pose);
     edge.to = query.id;
+    return tie_by(std::move(edge), known, query);
+  }
+
+  static Tie tie_by(MapEdge edge, const MapKeyframe& known, const MapKeyframe& query, std::optional<int> tag = {}) {
     const Pose<M, B> seen = known.T_MB * edge.T_from_to;
     const Quat turn = about_z(yaw_of(seen.q * query.T_MB.q.conjugate()));
-    return {edge, query.T_MB.p, seen.p, {turn, Vec3(seen.p - turn * query.T_MB.p)}};
+    return {std::move(edge), query.T_MB.p, seen.p, {turn, Vec3(seen.p - turn * query.T_MB.p)}, tag};
+  }
+
+  /// Of tags whose places in the building nobody has measured, every view with every other.
+  std::vector<Tie> tag_ties() const {
+    std::vector<Tie> out;
+    for (const MapTag& before : first_.tags)
+      for (const MapTag& now : second_.tags) {
+        const MapKeyframe *known = first_.find(before.keyframe), *query = second_.find(now.keyframe);
+        if (before.id == now.id && known != nullptr && query != nullptr)
+          out.push_back(tie_by(tag_edge(before, now), *known, *query, now.id));
+      }
+    return out;
+  }
+
+  static std::size_t agreeing_tags(const std::vector<Tie>& ties, const Pose<M, M>& T) {
+    std::set<int> agreeing;
+    for (const Tie& tie : ties)
+      if (tie.tag && tie.agrees(T)) agreeing.insert(*tie.tag);
+    return agreeing.size();
   }
 
   /// Keyframes of the second map.

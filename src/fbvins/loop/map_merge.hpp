@@ -14,8 +14,9 @@
 namespace fbvins {
 
 /// All keyframes, sessions and measurements of both, in the frame of the first, tied by loops between them and optimised. Anchors
-/// of `second` are kept where both are anchored. An error where they have no place in common, where what they have in common does
-/// not fit, or where they have a keyframe in common: a map merged with itself would hold everything twice.
+/// of `second` are kept where both are anchored. Tags without a known place that both have seen are places in common, also
+/// alone, where there are two of them. Keyframes that both have are taken once. An error where the maps have no place in common,
+/// where what they have in common does not fit, or where the first has more than half of the second's keyframes.
 Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary);
 
 struct LeftOutMap {
