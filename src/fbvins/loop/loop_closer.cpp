@@ -306,8 +306,23 @@ bool LoopCloser::optimisation_due() const {
   return frame_.known() && news_since_optimised_ >= std::max(kOptimiseAfter, static_cast<int>(map_.size()) / kOptimiseShare);
 }
 
+/// Without anchors the measurements leave it open where M lies. It stays where its keyframes move least, and not with the first
+/// of them: those of a flight's first seconds err most, and a loop back to them would move all that came after.
+PoseGraphReport LoopCloser::optimise_graph() {
+  const auto poses = [this] {
+    std::vector<Pose<M, B>> all;
+    for (const MapKeyframe& k : map_.keyframes())
+      if (k.placed) all.push_back(k.T_MB);
+    return all;
+  };
+  const std::vector<Pose<M, B>> before = poses();
+  const PoseGraphReport report = map_.optimise({options_.degrees_of_freedom});
+  if (!map_.anchored) map_.move(nearest_to(before, poses(), kTypicalDepth_m));
+  return report;
+}
+
 void LoopCloser::optimise(MapUpdate& update) {
-  map_.optimise({options_.degrees_of_freedom});
+  optimise_graph();
   news_since_optimised_ = 0;
   if (const MapKeyframe* newest = map_.find(session_.newest); newest != nullptr && frame_.known()) {
     const Mat4 P = frame_.covariance();
@@ -319,7 +334,7 @@ void LoopCloser::optimise(MapUpdate& update) {
 
 PoseGraphReport LoopCloser::finish() {
   level_by_newest();
-  const PoseGraphReport report = map_.optimise({options_.degrees_of_freedom});
+  const PoseGraphReport report = optimise_graph();
   upkeep();
   return report;
 }

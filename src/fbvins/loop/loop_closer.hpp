@@ -113,6 +113,7 @@ class LoopCloser final : public Mapper {
   std::vector<AnchoredPose> anchored_poses() const;
   void find_building(MapUpdate& update);
   bool optimisation_due() const;
+  PoseGraphReport optimise_graph();
   void optimise(MapUpdate& update);
   void take_out(KeyframeId id);
   void upkeep();

@@ -24,25 +24,30 @@ struct Outcome {
   int accepted = 0, refused = 0;
 };
 
-/// Errors against the truth without alignment: M starts where W starts.
+using Poses = std::vector<Pose<M, B>>;
+
+/// RMSE after the best turn about z and shift.
+double error_m(const Poses& poses, const Poses& truth) {
+  const Pose<M, M> T = nearest_to(truth, poses, 0);
+  double sum = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) sum += (T * poses[i].p - truth[i].p).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(poses.size()));
+}
+
 Outcome run(LoopCloser& closer, const std::vector<Frame>& frames) {
   Outcome o;
   Trajectory<G> odometry;
-  const Pose<G, B> T0 = frames[0].truth;
-  const Pose<G, G> to_truth = T0 * frames[0].odometry.inverse();
-  const Pose<G, M> M_to_truth(to_truth.q, to_truth.p);
+  Poses truth, in_W, causal, after;
   for (const Frame& f : frames) {
     const MapUpdate u = closer.process(f.place, keyframe(FrameId{f.t.ns / 1000}, f.t, f.odometry));
-    odometry.push_back({f.t, f.odometry});
     o.accepted += u.stats.accepted, o.refused += u.stats.refused;
-    o.causal_m += (M_to_truth * (u.T_MG * f.odometry).p - f.truth.p).squaredNorm();
-    o.W_m += (to_truth * f.odometry.p - f.truth.p).squaredNorm();
+    odometry.push_back({f.t, f.odometry});
+    truth.push_back({f.truth.q, f.truth.p}), in_W.push_back({f.odometry.q, f.odometry.p});
+    causal.push_back(u.T_MG * f.odometry);
   }
   closer.finish();
-  const Trajectory<M> corrected = closer.corrected(odometry);
-  for (std::size_t i = 0; i < frames.size(); ++i) o.after_m += (M_to_truth * corrected[i].T.p - frames[i].truth.p).squaredNorm();
-  const auto n = static_cast<double>(frames.size());
-  o.W_m = std::sqrt(o.W_m / n), o.causal_m = std::sqrt(o.causal_m / n), o.after_m = std::sqrt(o.after_m / n);
+  for (const StampedPose<M>& p : closer.corrected(odometry)) after.push_back(p.T);
+  o.W_m = error_m(in_W, truth), o.causal_m = error_m(causal, truth), o.after_m = error_m(after, truth);
   return o;
 }
 
@@ -52,8 +57,8 @@ TEST(LoopCloser, TakesOutDriftAtOnceAndMoreAfterwards) {
   const Outcome o = run(closer, frames);
   EXPECT_GT(o.W_m, 0.03);
   EXPECT_GT(o.accepted, 200);
-  EXPECT_LT(o.causal_m, 0.6 * o.W_m);
-  EXPECT_LT(o.after_m, 0.5 * o.W_m);
+  EXPECT_LT(o.causal_m, 0.65 * o.W_m);
+  EXPECT_LT(o.after_m, 0.25 * o.W_m);
 }
 
 TEST(LoopCloser, BetterKnownGravityTurnsTheWholeMapAndBendsNothing) {
@@ -125,6 +130,25 @@ TEST(LoopCloser, ANewMapStaysWhereItIsUntilItLeansForCertainAndSaysHowItMoved) {
   EXPECT_LT((first.q * frames[0].truth.q.conjugate() * Vec3::UnitZ() - Vec3::UnitZ()).norm(), 1e-4) << "level in the end";
 }
 
+TEST(LoopCloser, MStaysWithTheManyAndNotWithItsFirstKeyframe) {
+  auto frames = flight(room(1), 250, 0, 0, 3);
+  const Vec3 error(0.04, 0, 0.02);  // of the first seconds, in which an odometry errs most
+  for (std::size_t i = 0; i < 12; ++i) frames[i].odometry.p += (1 - static_cast<double>(i) / 12) * error;
+  LoopCloser closer(rig(), {}, vocabulary());
+  int optimised = 0;
+  Vec3 moved = Vec3::Zero();
+  for (const Frame& f : frames) {
+    const MapUpdate u = closer.process(f.place, keyframe(FrameId{f.t.ns / 1000}, f.t, f.odometry));
+    optimised += u.stats.optimised;
+    moved = u.T_MG.p;
+  }
+  closer.finish();
+  EXPECT_GT(optimised, 2);
+  const auto &first = closer.map().keyframes()[0], &later = closer.map().keyframes()[100];
+  EXPECT_LT((later.T_MB.p - first.T_MB.p - (frames[100].truth.p - frames[0].truth.p)).norm(), 0.025) << "loops correct it";
+  EXPECT_LT(moved.norm(), 0.3 * error.norm()) << "and what came after it stays";
+}
+
 TEST(LoopCloser, ARestartLeavesANewMapAsLevelAsIsKnown) {
   const auto frames = flight(room(1), 22, 0, 0, 3);
   LoopCloser closer(rig(), {}, vocabulary());
@@ -159,7 +183,7 @@ TEST(LoopCloser, ALaterFlightsGaugeIsItsOwn) {
   EXPECT_LT(worst_m, 0.05);
   const Vec3 first_before = first.map().keyframes()[0].T_MB.p;
   again.finish();
-  EXPECT_EQ(again.map().keyframes()[0].T_MB.p, first_before) << "the old map's frame stays";
+  EXPECT_LT((again.map().keyframes()[0].T_MB.p - first_before).norm(), 0.003) << "the old map's frame stays";
 }
 
 /// A keyframe without images, a second after the one before, with the readings since then of an IMU at rest.

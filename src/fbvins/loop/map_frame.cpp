@@ -32,6 +32,21 @@ DriftVariance drift_over(const DriftOptions& o, double metres, double seconds) {
 
 Quat about_z(double yaw_rad) { return {std::cos(0.5 * yaw_rad), 0, 0, std::sin(0.5 * yaw_rad)}; }
 
+Pose<M, M> nearest_to(std::span<const Pose<M, B>> wanted, std::span<const Pose<M, B>> poses, double lever_m) {
+  Vec3 wanted_sum = Vec3::Zero(), sum = Vec3::Zero();
+  for (std::size_t i = 0; i < poses.size(); ++i) wanted_sum += wanted[i].p, sum += poses[i].p;
+  const double n = static_cast<double>(std::max<std::size_t>(poses.size(), 1));
+  double sine = 0, cosine = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Vec3 a = poses[i].p - sum / n, b = wanted[i].p - wanted_sum / n;
+    const double turned = yaw_of(wanted[i].q * poses[i].q.conjugate());
+    sine += a.x() * b.y() - a.y() * b.x() + lever_m * lever_m * std::sin(turned);
+    cosine += a.x() * b.x() + a.y() * b.y() + lever_m * lever_m * std::cos(turned);
+  }
+  const Quat turn = about_z(std::atan2(sine, cosine));
+  return {turn, Vec3((wanted_sum - turn * sum) / n)};
+}
+
 double yaw_of(const Quat& q) { return wrapped(2 * std::atan2(q.z(), q.w())); }
 
 void MapFrame::put(double yaw_rad, const Vec3& p_MB) {

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
@@ -40,6 +41,10 @@ struct MeasuredPose {
 /// Yaw of a rotation that is nearly about z, rad; and the rotation about z by an angle.
 double yaw_of(const Quat& q);
 Quat about_z(double yaw_rad);
+
+/// The turn about z and the shift that bring poses of a map nearest to where they are `wanted`, as many: the sum of the squared
+/// distances, and of the squared turns times `lever_m`, is least.
+Pose<M, M> nearest_to(std::span<const Pose<M, B>> wanted, std::span<const Pose<M, B>> poses, double lever_m);
 
 class MapFrame {
  public:

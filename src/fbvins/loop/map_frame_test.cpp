@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/core/rng.hpp"
+
 namespace fbvins {
 namespace map_frame_test {
 
@@ -107,6 +109,24 @@ TEST(MapFrame, AnAnchorsGateAndUpdateAreThoseOfItsPoint) {
     frame.update(measurement_of(behind), before);
   }
   EXPECT_NEAR(yaw_of(frame.yaw() * q_before.conjugate()), 0.1, 0.01);
+}
+
+TEST(NearestTo, FindsTheTurnAndShiftOfPosesAndKeepsTheVertical) {
+  Rng rng(3);
+  const auto vector = [&](double size) { return Vec3(size * Vec3(rng.normal(), rng.normal(), rng.normal())); };
+  std::vector<Pose<M, B>> wanted, poses;
+  const Pose<M, M> T(about_z(0.7), Vec3(1, -2, 3));
+  for (int i = 0; i < 20; ++i) {
+    poses.push_back({so3_exp(vector(1)), vector(4)});
+    wanted.push_back(T * poses.back());
+  }
+  const Pose<M, M> found = nearest_to(wanted, poses, 2);
+  EXPECT_LT((found.p - T.p).norm(), 1e-9);
+  EXPECT_LT(so3_log(found.q.conjugate() * T.q).norm(), 1e-9);
+  EXPECT_LT((nearest_to({}, {}, 2).p).norm(), 1e-12) << "of no poses nothing is known";
+  // On one spot the positions say nothing of a turn, and attitudes do.
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].p = vector(0.001), wanted[i].p = vector(0.001);
+  EXPECT_NEAR(yaw_of(nearest_to(wanted, poses, 2).q), 0.7, 1e-3);
 }
 
 TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {
