@@ -27,6 +27,8 @@ constexpr double kTrouble_s = 2;
 constexpr double kAtOnce = 2;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.1;
+/// Of a slower motion the velocity's error is another than the scale's.
+constexpr double kShowsScale_mps = 0.2;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
 constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
@@ -146,6 +148,7 @@ void Estimator::open_window(const InitialSolution& start) {
   carried_.begin_window();
   frames_with_readings_ = kFramesAfterGap;
   up_sigma_rad_ = 0;
+  scale_known_ = 0;
 }
 
 /// From here on each observation knows when and from where it was seen (S1-S4).
@@ -275,6 +278,9 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg) + axis_covariance(mean_rate_B(window_.frames()).norm());
   out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_covariance(options_.gravity_mps2);
   up_sigma_rad_ = up_sigma_rad(*covariance);
+  if (one_camera_ && level_state.v_FB.norm() > kShowsScale_mps)
+    scale_known_ = scale_sigma_of(level_state.v_FB, out.velocity_covariance);
+  out.scale_sigma = scale_known_;
 }
 
 void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {

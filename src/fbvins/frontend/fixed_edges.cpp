@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/fixed_edges.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+/// Mean gradient of an edge, grey values a pixel of the small image: more than noise has. Vignetting has as much towards the edge
+/// of a wide lens's image, but nearly the same all around.
+constexpr float kEdge = 2;
+/// An edge agrees with its mean where it has this share of its strength: gain and light change.
+constexpr float kStrength = 0.35f;
+constexpr float kMostlyThere = 0.8f;
+/// Square of the mean gradient against the mean square: near 1 of one edge, less where gain changes or dirt lets the scene shine
+/// through. Different edges of the scene that meet at a pixel, such as a room's under its ceiling, leave a mean that is weak
+/// beside each of them.
+constexpr float kOneEdge = 0.15f;
+/// What was fixed is so until it has less than this share of what a new edge needs.
+constexpr float kStill = 0.6f;
+
+/// Eight times Sobel's gradient at the pixels right of two of a row's neighbours.
+struct EightfoldGradient {
+  const std::uint8_t *a, *p, *b;
+  EightfoldGradient(const Image& image, int y) : a(image.row(y - 1)), p(image.row(y)), b(image.row(y + 1)) {}
+  std::int32_t x(int u) const { return a[u + 1] - a[u - 1] + 2 * (p[u + 1] - p[u - 1]) + b[u + 1] - b[u - 1]; }
+  std::int32_t y(int u) const { return b[u - 1] - a[u - 1] + 2 * (b[u] - a[u]) + b[u + 1] - a[u + 1]; }
+};
+
+/// Grey values a pixel.
+Eigen::Vector2f gradient(const Image& image, int x, int y) {
+  const EightfoldGradient row(image, y);
+  return 0.125f * Eigen::Vector2f(static_cast<float>(row.x(x)), static_cast<float>(row.y(x)));
+}
+
+/// Sums over rectangles of an image.
+class RectangleSums {
+ public:
+  RectangleSums(const std::vector<std::int32_t>& values, int width, int height) : width_(width) {
+    sums_.assign(static_cast<std::size_t>(width + 1) * static_cast<std::size_t>(height + 1), 0);
+    for (int y = 0; y < height; ++y) {
+      std::int64_t of_row = 0;
+      for (int x = 0; x < width; ++x) {
+        of_row += values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+        sums_[index(x + 1, y + 1)] = sums_[index(x + 1, y)] + of_row;
+      }
+    }
+  }
+  float of(int left, int top, int right, int bottom) const {
+    return static_cast<float>(sums_[index(right, bottom)] - sums_[index(left, bottom)] - sums_[index(right, top)] +
+                              sums_[index(left, top)]);
+  }
+
+ private:
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_ + 1) + static_cast<std::size_t>(x);
+  }
+
+  int width_;
+  std::vector<std::int64_t> sums_;
+};
+
+/// Black pixels and those at most `by` away from one.
+Image grown(const Image& seen, int by) {
+  const Mask mask(seen);
+  Image out(seen.width(), seen.height(), 255);
+  for (int y = 0; y < out.height(); ++y)
+    for (int x = 0; x < out.width(); ++x)
+      if (mask.hides(Vec2(x, y), by)) out.at(x, y) = 0;
+  return out;
+}
+
+Image inverted(Image image) {
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) image.at(x, y) = static_cast<std::uint8_t>(255 - image.at(x, y));
+  return image;
+}
+
+Image shrunk(const Image& seen, int by) { return inverted(grown(inverted(seen), by)); }
+
+/// Whitens connected parts of fewer pixels.
+void drop_small(Image& seen, int fewest) {
+  Image done(seen.width(), seen.height(), 0);
+  std::vector<std::pair<int, int>> part;
+  for (int y = 0; y < seen.height(); ++y)
+    for (int x = 0; x < seen.width(); ++x) {
+      const auto take = [&](int u, int v) {
+        if (u < 0 || v < 0 || u >= seen.width() || v >= seen.height() || seen.at(u, v) != 0 || done.at(u, v) != 0) return;
+        done.at(u, v) = 1;
+        part.emplace_back(u, v);
+      };
+      part.clear();
+      take(x, y);
+      for (std::size_t i = 0; i < part.size(); ++i) {
+        const auto [u, v] = part[i];
+        take(u - 1, v), take(u + 1, v), take(u, v - 1), take(u, v + 1);
+      }
+      if (part.size() < static_cast<std::size_t>(fewest))
+        for (const auto& [u, v] : part) seen.at(u, v) = 255;
+    }
+}
+
+}  // namespace
+
+void FixedEdges::add(Look look) {
+  if (looks_.empty()) {
+    width_ = look.image->width(), height_ = look.image->height();
+    sums_x_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
+    sums_y_ = squares_ = sums_x_;
+  }
+  count(*look.image, 1);
+  looks_.push_back(std::move(look));
+}
+
+void FixedEdges::drop_oldest() {
+  count(*looks_.front().image, -1);
+  looks_.erase(looks_.begin());
+}
+
+void FixedEdges::count(const Image& image, int sign) {
+  for (int y = 1; y + 1 < height_; ++y) {
+    const EightfoldGradient row(image, y);
+    const auto begin = static_cast<std::ptrdiff_t>(y) * width_;
+    std::int32_t *const sums_x = sums_x_.data() + begin, *const sums_y = sums_y_.data() + begin;
+    std::int32_t* const squares = squares_.data() + begin;
+    for (int x = 1; x + 1 < width_; ++x) {
+      const std::int32_t along_x = row.x(x), along_y = row.y(x);
+      sums_x[x] += sign * along_x;
+      sums_y[x] += sign * along_y;
+      squares[x] += sign * (along_x * along_x + along_y * along_y);
+    }
+  }
+}
+
+/// Motion of a far point at a pixel of the small image by a small turn, px of the camera a radian: by its lens, at whose edge a
+/// fisheye's is half of a pinhole's. Zero where the lens sees nothing.
+Eigen::Matrix<float, 2, 3> FixedEdges::motion_by_turn(int x, int y) const {
+  constexpr double kTurn_rad = 1e-3;
+  Eigen::Matrix<float, 2, 3> out = Eigen::Matrix<float, 2, 3>::Zero();
+  const Vec2 pixel(rule_.reduction * x, rule_.reduction * y);
+  const auto ray = camera_.ray(pixel);
+  for (int i = 0; ray && i < 3; ++i) {
+    const auto there = camera_.pixel_of(*ray + kTurn_rad * Vec3::Unit(i).cross(*ray));
+    if (!there) return Eigen::Matrix<float, 2, 3>::Zero();
+    out.col(i) = ((*there - pixel) / kTurn_rad).cast<float>();
+  }
+  return out;
+}
+
+/// Whether an edge at the pixel stays while the scene moves across it. `shared` by vignetting.
+FixedEdges::Verdict FixedEdges::judge(int x, int y, const Eigen::Vector2f& shared, bool was_fixed) const {
+  const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+  const auto count = static_cast<float>(looks_.size());
+  const Eigen::Vector2f sum = 0.125f * Eigen::Vector2f(static_cast<float>(sums_x_[i]), static_cast<float>(sums_y_[i]));
+  const Eigen::Vector2f mean = sum / count - shared;
+  const float ease = was_fixed ? kStill : 1;
+  if (mean.squaredNorm() < ease * ease * kEdge * kEdge) return Verdict::not_fixed;
+  const float squares = static_cast<float>(squares_[i]) / 64 - 2 * shared.dot(sum) + count * shared.squaredNorm();
+  if (mean.squaredNorm() * count < ease * kOneEdge * squares) return Verdict::not_fixed;
+  return judge_each_look(x, y, mean, shared, ease);
+}
+
+FixedEdges::Verdict FixedEdges::judge_each_look(int x, int y, const Eigen::Vector2f& mean, const Eigen::Vector2f& shared,
+                                                float ease) const {
+  const float strength = mean.norm();
+  const Eigen::Vector2f across = mean / strength;
+  std::vector<bool> there;
+  int present = 0;
+  for (const Look& look : looks_) {
+    there.push_back((gradient(*look.image, x, y) - shared).dot(across) > kStrength * strength);
+    present += there.back();
+  }
+  if (static_cast<float>(present) < ease * kMostlyThere * static_cast<float>(looks_.size())) return Verdict::not_fixed;
+  const Eigen::RowVector3f by_turn = across.transpose() * motion_by_turn(x, y);
+  int pairs = 0, stayed = 0;
+  for (std::size_t i = kLooksApart; i < looks_.size(); ++i) {
+    const Look& look = looks_[i];
+    if (std::abs(look.moved_px.dot(across)) < kAcross_px ||
+        std::abs(by_turn.dot(look.turned_rad)) < kTurned_px + by_turn.norm() * look.by_bias_rad)
+      continue;
+    ++pairs;
+    stayed += there[i - kLooksApart] && there[i];
+  }
+  if (pairs < rule_.fewest_pairs) return Verdict::unknown;
+  return static_cast<float>(stayed) >= ease * kMostlyThere * static_cast<float>(pairs) ? Verdict::fixed : Verdict::not_fixed;
+}
+
+Image FixedEdges::edges(const Image* before) const {
+  Image out(width_, height_, 255);
+  const RectangleSums sums_x(sums_x_, width_, height_), sums_y(sums_y_, width_, height_);
+  const float scale = 0.125f / static_cast<float>(looks_.size());
+  for (int y = 1; y + 1 < height_; ++y)
+    for (int x = 1; x + 1 < width_; ++x) {
+      const int left = std::max(1, x - rule_.around_px), right = std::min(width_ - 1, x + rule_.around_px + 1);
+      const int top = std::max(1, y - rule_.around_px), bottom = std::min(height_ - 1, y + rule_.around_px + 1);
+      const float around = scale / static_cast<float>((right - left) * (bottom - top));
+      const Eigen::Vector2f shared(around * sums_x.of(left, top, right, bottom), around * sums_y.of(left, top, right, bottom));
+      const bool was_fixed = before != nullptr && before->at(x, y) == 0;
+      const Verdict verdict = judge(x, y, shared, was_fixed);
+      if (verdict == Verdict::fixed || (verdict == Verdict::unknown && was_fixed)) out.at(x, y) = 0;
+    }
+  return out;
+}
+
+Image FixedEdges::parts(Image seen) const {
+  seen = shrunk(grown(seen, rule_.gap_px), rule_.gap_px);
+  seen = grown(shrunk(seen, rule_.speck_px), rule_.speck_px);
+  drop_small(seen, rule_.smallest_px);
+  return grown(seen, rule_.skirt_px);
+}
+
+}  // namespace fbvins
