@@ -80,14 +80,14 @@ Image inverted(Image image) {
 
 Image shrunk(const Image& seen, int by) { return inverted(grown(inverted(seen), by)); }
 
-/// Whitens connected parts of fewer pixels.
-void drop_small(Image& seen, int fewest) {
+/// Makes connected parts of a colour that have fewer pixels black where they are white, and white where they are black.
+void drop_small(Image& seen, std::uint8_t colour, int fewest) {
   Image done(seen.width(), seen.height(), 0);
   std::vector<std::pair<int, int>> part;
   for (int y = 0; y < seen.height(); ++y)
     for (int x = 0; x < seen.width(); ++x) {
       const auto take = [&](int u, int v) {
-        if (u < 0 || v < 0 || u >= seen.width() || v >= seen.height() || seen.at(u, v) != 0 || done.at(u, v) != 0) return;
+        if (u < 0 || v < 0 || u >= seen.width() || v >= seen.height() || seen.at(u, v) != colour || done.at(u, v) != 0) return;
         done.at(u, v) = 1;
         part.emplace_back(u, v);
       };
@@ -98,7 +98,7 @@ void drop_small(Image& seen, int fewest) {
         take(u - 1, v), take(u + 1, v), take(u, v - 1), take(u, v + 1);
       }
       if (part.size() < static_cast<std::size_t>(fewest))
-        for (const auto& [u, v] : part) seen.at(u, v) = 255;
+        for (const auto& [u, v] : part) seen.at(u, v) = static_cast<std::uint8_t>(255 - colour);
     }
 }
 
@@ -177,8 +177,8 @@ FixedEdges::Verdict FixedEdges::judge_each_look(int x, int y, const Eigen::Vecto
   int pairs = 0, stayed = 0;
   for (std::size_t i = kLooksApart; i < looks_.size(); ++i) {
     const Look& look = looks_[i];
-    if (std::abs(look.moved_px.dot(across)) < kAcross_px ||
-        std::abs(by_turn.dot(look.turned_rad)) < kTurned_px + by_turn.norm() * look.by_bias_rad)
+    if (std::abs(look.moved_px.dot(across)) < rule_.across_px ||
+        std::abs(by_turn.dot(look.turned_rad)) < rule_.across_px + by_turn.norm() * look.by_bias_rad)
       continue;
     ++pairs;
     stayed += there[i - kLooksApart] && there[i];
@@ -207,7 +207,8 @@ Image FixedEdges::edges(const Image* before) const {
 Image FixedEdges::parts(Image seen) const {
   seen = shrunk(grown(seen, rule_.gap_px), rule_.gap_px);
   seen = grown(shrunk(seen, rule_.speck_px), rule_.speck_px);
-  drop_small(seen, rule_.smallest_px);
+  drop_small(seen, 255, rule_.largest_hole_px);
+  drop_small(seen, 0, rule_.smallest_px);
   return grown(seen, rule_.skirt_px);
 }
 

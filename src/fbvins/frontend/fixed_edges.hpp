@@ -18,19 +18,20 @@ namespace fbvins {
 
 /// Lengths and areas are in pixels of the small image.
 struct FixedEdgeRule {
-  int reduction = 2;      ///< pixels of the camera along one of the small image
+  int reduction = 2;  ///< pixels of the camera along one of the small image
+  /// Motion across an edge after which another one lies there, pixels of the camera: of the scene, and by the rig's turn alone,
+  /// which moves what is far away, or ahead, as well.
+  float across_px = 8;
   int fewest_pairs = 20;  ///< of looks between which the scene moved across an edge, to say that it is fixed
   int around_px = 15;     ///< what pixels so near have in common is vignetting, and no edge
   int gap_px = 5, speck_px = 1,
-      smallest_px = 80;  ///< gaps in a fixed thing that are filled, specks that are none, the smallest one
-  int skirt_px = 1;      ///< the outer side of an edge, where the scene shows through the blur
+      smallest_px = 80;     ///< gaps in a fixed thing that are filled, specks that are none, the smallest one
+  int largest_hole_px = 0;  ///< what edges enclose up to this area is taken for a part of the thing
+  int skirt_px = 1;         ///< the outer side of an edge, where the scene shows through the blur
 };
 
 /// Looks are compared with the one so many before: an odd number, so that of a rig that swings two different ones meet.
 inline constexpr std::size_t kLooksApart = 3;
-/// Motion across an edge after which another one lies there: of the scene, and by the rig's turn alone, which moves what is far
-/// away, or ahead, as well. Pixels of the camera.
-inline constexpr float kAcross_px = 8, kTurned_px = 8;
 /// Of the image: less is nothing to tell, more is an image that does not move.
 inline constexpr double kLeastFixedShare = 0.002, kMostFixedShare = 0.6;
 /// What is found so near to an existing mask is the edge of the same thing, masked by hand a little too small.

@@ -11,10 +11,19 @@ namespace fbvins {
 namespace {
 
 /// At a quarter of their size; the newest looks, and what a third of them is judged by.
-constexpr FixedEdgeRule kRule{
-    .reduction = 4, .fewest_pairs = 12, .around_px = 8, .gap_px = 3, .speck_px = 1, .smallest_px = 20, .skirt_px = 1};
+constexpr FixedEdgeRule kRule{.reduction = 4,
+                              .across_px = 16,
+                              .fewest_pairs = 12,
+                              .around_px = 8,
+                              .gap_px = 3,
+                              .speck_px = 1,
+                              .smallest_px = 40,
+                              .largest_hole_px = 1000,
+                              .skirt_px = 1};
 constexpr std::size_t kLooks = 24;
 constexpr int kLooksToJudgment = 4;
+/// Judgments in a row that find an edge fixed, before it counts: those of the scene that meet at a pixel by chance do not last.
+constexpr int kJudgments = 3;
 /// From a look to the next: motion of the scene, and time.
 constexpr double kStep_px = 16, kStep_s = 0.2;
 /// A feature that moves has moved so far from a look to the next, and so many of a camera's must.
@@ -125,10 +134,18 @@ void LensWatch::look(Watched& watched, int camera, const Image& image, const Tra
 }
 
 void LensWatch::judge(Watched& watched, const Camera& camera) {
-  const bool first = watched.edges.empty();
-  watched.edges = watched.fixed.edges(first ? nullptr : &watched.edges);
+  Image now = watched.fixed.edges(watched.edges.empty() ? nullptr : &watched.edges);
+  if (watched.edges.empty()) {
+    watched.edges = watched.covered = Image(now.width(), now.height(), 255);
+    watched.times = Image(now.width(), now.height(), 0);
+  }
+  for (int y = 0; y < now.height(); ++y)
+    for (int x = 0; x < now.width(); ++x) {
+      std::uint8_t& times = watched.times.at(x, y);
+      times = now.at(x, y) == 0 ? static_cast<std::uint8_t>(std::min(times + 1, kJudgments)) : std::uint8_t{0};
+      watched.edges.at(x, y) = times == kJudgments ? 0 : 255;
+    }
   Image found = watched.fixed.parts(watched.edges);
-  if (first) watched.covered = Image(found.width(), found.height(), 255);
   const auto [either, one] = black_in(found, watched.covered);
   if (one <= kChanged * either) return;
 

@@ -44,7 +44,8 @@ class LensWatch {
     FixedEdges fixed;
     std::shared_ptr<const Mask> own;                     // the calibration's
     std::shared_ptr<std::shared_ptr<const Mask>> shown;  // that rig() has
-    Image edges = {}, covered = {};                      // small; black where fixed
+    Image edges = {}, covered = {};                      // small; black where fixed, as often as is enough
+    Image times = {};                                    // small; of each pixel how often in a row an edge was fixed, up to that
     int covered_px = 0;
     Time looked = {};
     double moved_px = 0;  // since that look, at most
