@@ -24,8 +24,8 @@ constexpr std::size_t kLooks = 24;
 constexpr int kLooksToJudgment = 4;
 /// Judgments in a row that find an edge fixed, before it counts: those of the scene that meet at a pixel by chance do not last.
 constexpr int kJudgments = 3;
-/// From a look to the next: motion of the scene, and time.
-constexpr double kStep_px = 16, kStep_s = 0.2;
+/// From a look to the next: motion of the scene by the rig's turn, and time.
+constexpr double kStep_px = 8, kStep_s = 0.2;
 /// A feature that moves has moved so far from a look to the next, and so many of a camera's must.
 constexpr double kFeatureMoves_px = 2;
 constexpr std::size_t kFewestMoving = 8;
@@ -90,10 +90,10 @@ void LensWatch::add(const SensorPacket& packet, const StatePrior& prior, const T
     Watched& watched = watched_[static_cast<std::size_t>(i)];
     watched.step.turned_B += turned_B;
     watched.step.known = watched.step.known && prior.valid && !packet.imu.empty();
-    watched.moved_px += tracked.stats.median_motion_px;
     const auto image = packet.frame.image(i);
     if (!is_usable(image.get(), rig_.camera(i))) continue;
-    if (watched.looks == 0 || (watched.moved_px >= kStep_px && (packet.frame.t - watched.looked).seconds() >= kStep_s))
+    const double turned_px = rig_.camera(i).focal_px() * watched.step.turned_B.norm();
+    if (watched.looks == 0 || (turned_px >= kStep_px && (packet.frame.t - watched.looked).seconds() >= kStep_s))
       look(watched, i, *image, tracked);
   }
 }
@@ -128,7 +128,6 @@ void LensWatch::look(Watched& watched, int camera, const Image& image, const Tra
   watched.fixed.add(std::move(newest));
   if (watched.fixed.size() > kLooks) watched.fixed.drop_oldest();
   watched.looked = tracked.t;
-  watched.moved_px = 0;
   watched.step = {.known = true};
   if (++watched.looks % kLooksToJudgment == 0 && watched.fixed.size() == kLooks) judge(watched, rig_.camera(camera));
 }

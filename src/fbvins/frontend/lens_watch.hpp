@@ -48,8 +48,7 @@ class LensWatch {
     Image times = {};                                    // small; of each pixel how often in a row an edge was fixed, up to that
     int covered_px = 0;
     Time looked = {};
-    double moved_px = 0;  // since that look, at most
-    Step step = {.known = true};
+    Step step = {.known = true};    // since that look
     std::vector<SeenAt> seen = {};  // then, by ascending id
     std::array<Step, kLooksApart> steps = {};
     int looks = 0;

@@ -66,7 +66,6 @@ struct Flight {
         feature.left = feature.right = Observation{.pixel = px};
         tracked.features.push_back(feature);
       }
-      tracked.stats.median_motion_px = (shift_px(t_s) - shift_px(t_s - kPeriod_s)).norm();
       StatePrior prior;
       prior.valid = estimated;
       prior.bias.gyro_radps = bias_radps;
