@@ -21,12 +21,14 @@ constexpr float kOneEdge = 0.15f;
 /// What was fixed is so until it has less than this share of what a new edge needs.
 constexpr float kStill = 0.6f;
 
-/// Eight times Sobel's gradient at the pixels right of two of a row's neighbours.
+/// Eight times Sobel's gradient at the pixels of a row.
 struct EightfoldGradient {
   const std::uint8_t *a, *p, *b;
   EightfoldGradient(const Image& image, int y) : a(image.row(y - 1)), p(image.row(y)), b(image.row(y + 1)) {}
-  std::int32_t x(int u) const { return a[u + 1] - a[u - 1] + 2 * (p[u + 1] - p[u - 1]) + b[u + 1] - b[u - 1]; }
-  std::int32_t y(int u) const { return b[u - 1] - a[u - 1] + 2 * (b[u] - a[u]) + b[u + 1] - a[u + 1]; }
+  std::int16_t x(int u) const {
+    return static_cast<std::int16_t>(a[u + 1] - a[u - 1] + 2 * (p[u + 1] - p[u - 1]) + b[u + 1] - b[u - 1]);
+  }
+  std::int16_t y(int u) const { return static_cast<std::int16_t>(b[u - 1] - a[u - 1] + 2 * (b[u] - a[u]) + b[u + 1] - a[u + 1]); }
 };
 
 /// Grey values a pixel.
@@ -35,31 +37,35 @@ Eigen::Vector2f gradient(const Image& image, int x, int y) {
   return 0.125f * Eigen::Vector2f(static_cast<float>(row.x(x)), static_cast<float>(row.y(x)));
 }
 
-/// Sums over rectangles of an image.
-class RectangleSums {
+/// Sums over the squares around a row's pixels, from row to row; the image's border does not count.
+class SquareSums {
  public:
-  RectangleSums(const std::vector<std::int32_t>& values, int width, int height) : width_(width) {
-    sums_.assign(static_cast<std::size_t>(width + 1) * static_cast<std::size_t>(height + 1), 0);
-    for (int y = 0; y < height; ++y) {
-      std::int64_t of_row = 0;
-      for (int x = 0; x < width; ++x) {
-        of_row += values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
-        sums_[index(x + 1, y + 1)] = sums_[index(x + 1, y)] + of_row;
-      }
-    }
+  SquareSums(const std::vector<std::int32_t>& values, int width, int height, int around)
+      : values_(values.data()), width_(width), height_(height), around_(around), columns_(static_cast<std::size_t>(width), 0) {
+    for (int y = 1; y < std::min(around, height - 1); ++y) add(y, 1);
   }
-  float of(int left, int top, int right, int bottom) const {
-    return static_cast<float>(sums_[index(right, bottom)] - sums_[index(left, bottom)] - sums_[index(right, top)] +
-                              sums_[index(left, top)]);
+  /// Rows in order from 1 on: of x = 1 to width - 2.
+  void next(int y, std::vector<std::int32_t>& of_row) {
+    if (y + around_ < height_ - 1) add(y + around_, 1);
+    if (y - around_ - 1 >= 1) add(y - around_ - 1, -1);
+    std::int32_t sum = 0;
+    for (int x = 1; x < std::min(around_ + 1, width_ - 1); ++x) sum += columns_[static_cast<std::size_t>(x)];
+    for (int x = 1; x + 1 < width_; ++x) {
+      if (x + around_ < width_ - 1) sum += columns_[static_cast<std::size_t>(x + around_)];
+      if (x - around_ - 1 >= 1) sum -= columns_[static_cast<std::size_t>(x - around_ - 1)];
+      of_row[static_cast<std::size_t>(x)] = sum;
+    }
   }
 
  private:
-  std::size_t index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_ + 1) + static_cast<std::size_t>(x);
+  void add(int y, std::int32_t sign) {
+    const std::int32_t* const row = values_ + static_cast<std::ptrdiff_t>(y) * width_;
+    for (int x = 0; x < width_; ++x) columns_[static_cast<std::size_t>(x)] += sign * row[x];
   }
 
-  int width_;
-  std::vector<std::int64_t> sums_;
+  const std::int32_t* values_;
+  int width_, height_, around_;
+  std::vector<std::int32_t> columns_;
 };
 
 /// Black pixels and those at most `by` away from one.
@@ -104,32 +110,40 @@ void drop_small(Image& seen, std::uint8_t colour, int fewest) {
 
 }  // namespace
 
-void FixedEdges::add(Look look) {
+void FixedEdges::add(Look look, std::size_t most) {
   if (looks_.empty()) {
     width_ = look.image->width(), height_ = look.image->height();
     sums_x_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
     sums_y_ = squares_ = sums_x_;
   }
-  count(*look.image, 1);
+  const bool full = looks_.size() >= most;
+  count(*look.image, full ? looks_.front().image.get() : nullptr);
+  if (full) looks_.erase(looks_.begin());
   looks_.push_back(std::move(look));
 }
 
-void FixedEdges::drop_oldest() {
-  count(*looks_.front().image, -1);
-  looks_.erase(looks_.begin());
-}
-
-void FixedEdges::count(const Image& image, int sign) {
+void FixedEdges::count(const Image& added, const Image* dropped) {
+  const auto squared = [](std::int16_t a, std::int16_t b) { return std::int32_t{a} * a + std::int32_t{b} * b; };
   for (int y = 1; y + 1 < height_; ++y) {
-    const EightfoldGradient row(image, y);
     const auto begin = static_cast<std::ptrdiff_t>(y) * width_;
     std::int32_t *const sums_x = sums_x_.data() + begin, *const sums_y = sums_y_.data() + begin;
     std::int32_t* const squares = squares_.data() + begin;
+    const EightfoldGradient in(added, y);
+    if (dropped == nullptr) {
+      for (int x = 1; x + 1 < width_; ++x) {
+        const std::int16_t in_x = in.x(x), in_y = in.y(x);
+        sums_x[x] += in_x;
+        sums_y[x] += in_y;
+        squares[x] += squared(in_x, in_y);
+      }
+      continue;
+    }
+    const EightfoldGradient out(*dropped, y);
     for (int x = 1; x + 1 < width_; ++x) {
-      const std::int32_t along_x = row.x(x), along_y = row.y(x);
-      sums_x[x] += sign * along_x;
-      sums_y[x] += sign * along_y;
-      squares[x] += sign * (along_x * along_x + along_y * along_y);
+      const std::int16_t in_x = in.x(x), in_y = in.y(x), out_x = out.x(x), out_y = out.y(x);
+      sums_x[x] += in_x - out_x;
+      sums_y[x] += in_y - out_y;
+      squares[x] += squared(in_x, in_y) - squared(out_x, out_y);
     }
   }
 }
@@ -189,22 +203,29 @@ FixedEdges::Verdict FixedEdges::judge_each_look(int x, int y, const Eigen::Vecto
 
 Image FixedEdges::edges(const Image* before) const {
   Image out(width_, height_, 255);
-  const RectangleSums sums_x(sums_x_, width_, height_), sums_y(sums_y_, width_, height_);
+  SquareSums squares_x(sums_x_, width_, height_, rule_.around_px), squares_y(sums_y_, width_, height_, rule_.around_px);
+  std::vector<std::int32_t> around_x(static_cast<std::size_t>(width_)), around_y(around_x);
   const float scale = 0.125f / static_cast<float>(looks_.size());
-  for (int y = 1; y + 1 < height_; ++y)
+  for (int y = 1; y + 1 < height_; ++y) {
+    squares_x.next(y, around_x);
+    squares_y.next(y, around_y);
+    const int rows = std::min(height_ - 2, y + rule_.around_px) - std::max(1, y - rule_.around_px) + 1;
     for (int x = 1; x + 1 < width_; ++x) {
-      const int left = std::max(1, x - rule_.around_px), right = std::min(width_ - 1, x + rule_.around_px + 1);
-      const int top = std::max(1, y - rule_.around_px), bottom = std::min(height_ - 1, y + rule_.around_px + 1);
-      const float around = scale / static_cast<float>((right - left) * (bottom - top));
-      const Eigen::Vector2f shared(around * sums_x.of(left, top, right, bottom), around * sums_y.of(left, top, right, bottom));
+      const int columns = std::min(width_ - 2, x + rule_.around_px) - std::max(1, x - rule_.around_px) + 1;
+      const auto i = static_cast<std::size_t>(x);
+      const float share = scale / static_cast<float>(rows * columns);
+      const Eigen::Vector2f shared(share * static_cast<float>(around_x[i]), share * static_cast<float>(around_y[i]));
       const bool was_fixed = before != nullptr && before->at(x, y) == 0;
       const Verdict verdict = judge(x, y, shared, was_fixed);
       if (verdict == Verdict::fixed || (verdict == Verdict::unknown && was_fixed)) out.at(x, y) = 0;
     }
+  }
   return out;
 }
 
 Image FixedEdges::parts(Image seen) const {
+  const ImageView all = seen.view();
+  if (std::all_of(all.data, all.row(all.height), [](std::uint8_t value) { return value != 0; })) return seen;
   seen = shrunk(grown(seen, rule_.gap_px), rule_.gap_px);
   seen = grown(shrunk(seen, rule_.speck_px), rule_.speck_px);
   drop_small(seen, 255, rule_.largest_hole_px);

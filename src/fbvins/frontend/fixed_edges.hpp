@@ -49,9 +49,8 @@ class FixedEdges {
  public:
   FixedEdges(const Camera& camera, const FixedEdgeRule& rule) : camera_(camera), rule_(rule) {}
 
-  /// Images are of one size.
-  void add(Look look);
-  void drop_oldest();
+  /// Images are of one size. Where there are `most` already, the oldest goes.
+  void add(Look look, std::size_t most = SIZE_MAX);
   std::size_t size() const { return looks_.size(); }
   /// The small image, black at edges that stay. With `before`, the result of earlier looks: an edge that was fixed is one until
   /// it is clearly gone, and where the scene did not move across it nothing new is said.
@@ -61,7 +60,7 @@ class FixedEdges {
 
  private:
   enum class Verdict { fixed, not_fixed, unknown };
-  void count(const Image& image, int sign);
+  void count(const Image& added, const Image* dropped);
   Verdict judge(int x, int y, const Eigen::Vector2f& shared, bool was_fixed) const;
   Verdict judge_each_look(int x, int y, const Eigen::Vector2f& mean, const Eigen::Vector2f& shared, float ease) const;
   Eigen::Matrix<float, 2, 3> motion_by_turn(int x, int y) const;

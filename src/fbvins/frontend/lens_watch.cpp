@@ -10,22 +10,22 @@
 namespace fbvins {
 namespace {
 
-/// At a quarter of their size; the newest looks, and what a third of them is judged by.
+/// At a quarter of their size; the newest looks, and after how many more they are judged.
 constexpr FixedEdgeRule kRule{.reduction = 4,
                               .across_px = 16,
-                              .fewest_pairs = 12,
+                              .fewest_pairs = 8,
                               .around_px = 8,
                               .gap_px = 3,
                               .speck_px = 1,
                               .smallest_px = 40,
                               .largest_hole_px = 1000,
                               .skirt_px = 1};
-constexpr std::size_t kLooks = 24;
-constexpr int kLooksToJudgment = 4;
+constexpr std::size_t kLooks = 16;
+constexpr int kLooksToJudgment = 6;
 /// Judgments in a row that find an edge fixed, before it counts: those of the scene that meet at a pixel by chance do not last.
-constexpr int kJudgments = 3;
+constexpr int kJudgments = 2;
 /// From a look to the next: motion of the scene by the rig's turn, and time.
-constexpr double kStep_px = 8, kStep_s = 0.2;
+constexpr double kStep_px = 8, kStep_s = 0.3;
 /// A feature that moves has moved so far from a look to the next, and so many of a camera's must.
 constexpr double kFeatureMoves_px = 2;
 constexpr std::size_t kFewestMoving = 8;
@@ -34,18 +34,18 @@ constexpr float kBias_radps = 0.005f;
 /// A mask is replaced by one that differs from it in this share of what either hides.
 constexpr double kChanged = 0.25;
 
-/// Each pixel the mean of a square of 4 x 4.
+/// Each pixel the mean of the two middle rows of a square of 4 x 4.
 std::shared_ptr<const Image> quarter_of(const Image& image) {
   constexpr int k = kRule.reduction;
   auto out = std::make_shared<Image>(image.width() / k, image.height() / k);
   std::vector<std::uint16_t> columns(static_cast<std::size_t>(out->width() * k));
   for (int y = 0; y < out->height(); ++y) {
-    const std::uint8_t *a = image.row(k * y), *b = image.row(k * y + 1), *c = image.row(k * y + 2), *d = image.row(k * y + 3);
-    for (std::size_t x = 0; x < columns.size(); ++x) columns[x] = static_cast<std::uint16_t>(a[x] + b[x] + c[x] + d[x]);
+    const std::uint8_t *a = image.row(k * y + 1), *b = image.row(k * y + 2);
+    for (std::size_t x = 0; x < columns.size(); ++x) columns[x] = static_cast<std::uint16_t>(a[x] + b[x]);
     std::uint8_t* const row = out->row(y);
     for (int x = 0; x < out->width(); ++x) {
       const std::uint16_t* const four = columns.data() + k * x;
-      row[x] = static_cast<std::uint8_t>((four[0] + four[1] + four[2] + four[3] + k * k / 2) / (k * k));
+      row[x] = static_cast<std::uint8_t>((four[0] + four[1] + four[2] + four[3] + k) / (2 * k));
     }
   }
   return out;
@@ -125,8 +125,7 @@ void LensWatch::look(Watched& watched, int camera, const Image& image, const Tra
     newest.turned_rad = Vec3(rig_.T_BC(camera).q.conjugate() * sum.turned_B).cast<float>();
     newest.by_bias_rad = kBias_radps * static_cast<float>(kLooksApart * kStep_s);
   }
-  watched.fixed.add(std::move(newest));
-  if (watched.fixed.size() > kLooks) watched.fixed.drop_oldest();
+  watched.fixed.add(std::move(newest), kLooks);
   watched.looked = tracked.t;
   watched.step = {.known = true};
   if (++watched.looks % kLooksToJudgment == 0 && watched.fixed.size() == kLooks) judge(watched, rig_.camera(camera));
