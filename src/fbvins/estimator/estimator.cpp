@@ -25,10 +25,8 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kTrouble_s = 2;
 /// Otherwise so many times what a good pose may owe is made up for at once.
 constexpr double kAtOnce = 2;
-/// Of a start with one camera.
-constexpr double kMaxScaleSigmaAtStart = 0.1;
-/// Of a slower motion the velocity's error is another than the scale's.
-constexpr double kShowsScale_mps = 0.2;
+/// Of a start with one camera; and the slowest motion that shows the scale.
+constexpr double kMaxScaleSigmaAtStart = 0.1, kShowsScale_mps = 0.2;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
 constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
@@ -147,8 +145,7 @@ void Estimator::open_window(const InitialSolution& start) {
   monitor_.restart();
   carried_.begin_window();
   frames_with_readings_ = kFramesAfterGap;
-  up_sigma_rad_ = 0;
-  scale_known_ = 0;
+  up_sigma_rad_ = scale_known_ = 0;
 }
 
 /// From here on each observation knows when and from where it was seen (S1-S4).
