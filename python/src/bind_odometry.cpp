@@ -4,6 +4,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <bit>
 #include <limits>
 
 #include "bindings.hpp"
@@ -42,7 +43,7 @@ void each_number(Odometry& o, Take take) {
   all(o.gauge.q_LG.coeffs()), take(o.gauge.up_sigma_rad), all(o.v_WB), all(o.w_WB_B), all(o.bias.gyro_radps),
       all(o.bias.accel_mps2);
   all(o.pose_covariance), all(o.velocity_covariance), all(o.gyro_bias_covariance), all(o.accel_bias_covariance), all(o.up_W);
-  take(o.tilt_sigma_rad);
+  take(o.tilt_sigma_rad), take(o.scale_sigma);
   EstimatorStats& s = o.stats;
   for (double* x : {&s.initial_cost, &s.final_cost, &s.prepare_ms, &s.solve_ms, &s.marginalise_ms}) take(*x);
 }
@@ -50,10 +51,11 @@ using OdometryState = std::tuple<std::vector<std::int64_t>, std::vector<double>>
 
 OdometryState state_of(Odometry& o) {
   const EstimatorStats& s = o.stats;
-  OdometryState out{{o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason),
-                     o.health.without_cameras, o.reset_counter, s.frames_in_window, s.landmarks, s.known_landmarks,
-                     s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
-                    {}};
+  OdometryState out{
+      {o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason), o.health.without_cameras,
+       std::bit_cast<std::int64_t>(o.health.covered_percent), o.reset_counter, s.frames_in_window, s.landmarks, s.known_landmarks,
+       s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
+      {}};
   each_number(o, [&](double x) { std::get<1>(out).push_back(x); });
   return out;
 }
@@ -66,6 +68,7 @@ void set_state(Odometry& self, const OdometryState& state) {
   self.id = FrameId{next()}, self.t = Time{next()}, self.level = next() != 0;
   self.health.state = static_cast<HealthState>(next()), self.health.reason = static_cast<HealthReason>(next());
   self.health.without_cameras = static_cast<std::uint8_t>(next());
+  self.health.covered_percent = std::bit_cast<decltype(self.health.covered_percent)>(next());
   self.reset_counter = static_cast<std::uint32_t>(next());
   EstimatorStats& s = self.stats;
   for (int* count : {&s.frames_in_window, &s.landmarks, &s.known_landmarks, &s.observations, &s.iterations, &s.outliers})
@@ -112,8 +115,14 @@ void bind_pose(nb::module_& m) {
       .def_prop_ro(
           "without_cameras", [](const Odometry& o) { return cameras_in(o.health.without_cameras); },
           "numbers of the cameras that deliver nothing or contradict the others, and are not used")
+      .def_prop_ro(
+          "covered_percent", [](const Odometry& o) { return covered_percent_of(o.health); },
+          "per cent of the cameras' images that something on the lens covers, up to the last camera of which any is")
       .def_ro("level", &Odometry::level, "whether the tilt is known to 0.3 degrees")
       .def_prop_ro("tilt_sigma_rad", [](const Odometry& o) { return o.health.has_pose() ? o.tilt_sigma_rad : kNaN; })
+      .def_prop_ro(
+          "scale_sigma", [](const Odometry& o) { return o.health.has_pose() && o.scale_sigma > 0 ? o.scale_sigma : kNaN; },
+          "relative standard deviation of the scale, of a rig with one camera; NaN with a pair, which knows it")
       .def_prop_ro(
           "protection_m", [](const Odometry& o) { return protection_level_m(o.health, o.pose_covariance); },
           "radius that the position's error is meant to exceed once in 10^4 poses at most, m; inf without a pose")

@@ -30,6 +30,7 @@ struct LivePose {
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
   double tilt_sigma_rad = 0;                ///< that of the propagated estimate
   bool level = false;                       ///< likewise
+  double scale_sigma = 0;                   ///< likewise, as in Odometry
   Health health;                            ///< the estimator's, or worse where sensors have been silent since
   std::uint32_t reset_counter = 0;          ///< +1 whenever W is a new frame
 };

@@ -2,6 +2,7 @@
 // What the estimator publishes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -51,14 +52,18 @@ struct Health {
   HealthState state = HealthState::initialising;
   HealthReason reason = HealthReason::none;
   std::uint8_t without_cameras = 0;  ///< bit c: camera c, which delivers nothing or contradicts the others, is not used
+  std::array<std::uint8_t, 8> covered_percent =
+      {};  ///< of each camera's image, by what was found in flight: dirt, a leg; rounded up
 
   bool has_pose() const { return state == HealthState::good || state == HealthState::degraded; }
   bool operator==(const Health&) const = default;
 };
-/// In one sentence: "good", "degraded: one_camera, without camera 1".
+/// In one sentence: "good", "degraded: one_camera, without camera 1", "good, camera 0 covered by 4 %".
 std::string to_sentence(const Health& health);
 /// The numbers of Health::without_cameras.
 std::vector<int> cameras_in(std::uint8_t bits);
+/// Health::covered_percent of the cameras up to the last one that is covered; empty where none is.
+std::vector<int> covered_percent_of(const Health& health);
 
 struct EstimatorStats {
   int frames_in_window = 0;
@@ -96,6 +101,7 @@ struct Odometry {
   Vec3 up_W = Vec3::UnitZ();                  ///< unit vector opposite to gravity, as estimated; z once the levelling is applied
   double tilt_sigma_rad = 0;                  ///< standard deviation of the attitude's tilt about its less certain axis
   bool level = false;                         ///< tilt_sigma_rad is below kLevelSigma_rad
+  double scale_sigma = 0;  ///< one camera: relative standard deviation of the scale; 0 with a pair or before a pose
   Health health;
   std::uint32_t reset_counter =
       0;  ///< +1 whenever W is a new frame: after a restart, or a correction too large to be made slowly

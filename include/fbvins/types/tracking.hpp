@@ -2,6 +2,7 @@
 // What the frontend gives the estimator, and the two values that are fed back.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -92,10 +93,11 @@ struct TrackedFrame {
   std::vector<bool> has_more = {};           ///< and of the cameras from 2 on
   ImuSegment imu;                            ///< since the frame before
   FrontendStats stats;
-  StereoFrame images;                            ///< null unless keyframes are wanted, which carry the images
-  std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
-  ExposureOffsets offsets = {};                  ///< of the cameras' images; filled by the system
-  std::vector<Anchor> anchors = {};              ///< for the map
+  StereoFrame images;                                ///< null unless keyframes are wanted, which carry the images
+  std::shared_ptr<const DepthImage> depth = {};      ///< of a rig with a depth sensor
+  ExposureOffsets offsets = {};                      ///< of the cameras' images; filled by the system
+  std::array<std::uint8_t, 8> covered_percent = {};  ///< as in Health; filled by the system
+  std::vector<Anchor> anchors = {};                  ///< for the map
 };
 
 /// A landmark with its last estimated position.

@@ -36,6 +36,8 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
     eyes_.push_back(make_eye(rig.mounted(i), gain, seed));
     const int width = rig.camera(i).width(), height = rig.camera(i).height();
     if (options.camera.legs > 0) eyes_.back().legs.emplace(width, height, options.camera.legs, i);
+    if (options.camera.dirt > 0 && i == 0)
+      eyes_.back().dirt.emplace(width, height, options.camera.dirt, static_cast<std::uint64_t>(options.seed));
     if (options.camera.propellers > 0) eyes_.back().propellers.emplace(width, height, options.camera.propellers, i);
   }
   if (rig.depth) depth_.emplace(options.depth, rig.depth_camera(), static_cast<std::uint64_t>(options.seed));
@@ -63,6 +65,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
   if (eye.faces.front().shown != nullptr) join_faces(eye);
   if (eye.legs) eye.legs->draw(eye.radiance);
   if (eye.propellers) eye.propellers->draw(eye.radiance, t_s, exposure_s, options_.camera.line_delay_us * 1e-6);
+  if (eye.dirt && t_s >= options_.camera.dirt_from_s && t_s < options_.camera.dirt_until_s) eye.dirt->draw(eye.radiance);
 }
 
 /// Each pixel from a face that shows it; black where none does.

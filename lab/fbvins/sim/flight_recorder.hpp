@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "fbvins/sim/dirt.hpp"
 #include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/propellers.hpp"
 #include "fbvins/sim/renderer.hpp"
@@ -41,6 +42,7 @@ class FlightRecorder {
     std::optional<Legs> legs;
     std::optional<Propellers> propellers;
     int height_px;
+    std::optional<Dirt> dirt = {};
     std::vector<float> radiance = {};
     MixedLight light = {};
     std::vector<Facet> facets = {};

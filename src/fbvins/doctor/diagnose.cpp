@@ -81,7 +81,19 @@ Result<Diagnosis> diagnose_group(const StereoRig& rig, const Replay& replay, Cal
   return best;
 }
 
-/// Each pair of the rig, from which more is known, and then each camera without a partner.
+Replay of_group(const Replay& replay, const CameraGroup& group) {
+  return [&replay, group](const TakeEvent& take) {
+    return replay([&](SensorEvent event) {
+      const auto* frame = std::get_if<StereoFrame>(&event);
+      if (frame == nullptr) return take(std::move(event));
+      std::optional<StereoFrame> images = frame_of_group(*frame, group);
+      return !images || take(*std::move(images));
+    });
+  };
+}
+
+/// Each pair of the rig, from which more is known, then each camera without a partner, and at last how those that overlap stand
+/// to one another, by what was corrected in their own.
 Result<Diagnosis> diagnose_groups(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
   Diagnosis all;
   all.rig = rig;
@@ -89,17 +101,14 @@ Result<Diagnosis> diagnose_groups(const StereoRig& rig, const Replay& replay, Ca
   std::vector<CameraGroup> groups = camera_groups(rig);
   std::ranges::stable_partition(groups, [](const CameraGroup& group) { return group.second.has_value(); });
   for (const CameraGroup& group : groups) {
-    const Replay of_group = [&](const TakeEvent& take) {
-      return replay([&](SensorEvent event) {
-        const auto* frame = std::get_if<StereoFrame>(&event);
-        if (frame == nullptr) return take(std::move(event));
-        std::optional<StereoFrame> images = frame_of_group(*frame, group);
-        return !images || take(*std::move(images));
-      });
-    };
-    const Result<Diagnosis> found = diagnose_group(rig_of(rig, group), of_group, style);
+    const Result<Diagnosis> found = diagnose_group(rig_of(rig, group), of_group(replay, group), style);
     if (!found) return found;
     add_group(*found, group, std::exchange(first, false), all);
+  }
+  for (const CameraGroup& pair : pairs_across(rig)) {
+    const Result<Diagnosis> found = examine_with(rig_of(all.rig, pair), of_group(replay, pair), style);
+    if (!found) return found;
+    add_across(*found, pair, all);
   }
   return all;
 }

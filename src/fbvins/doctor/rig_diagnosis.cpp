@@ -25,6 +25,14 @@ bool concerns_all_groups(FindingKind kind) {
   }
 }
 
+/// Share of a camera's view that another one has to see.
+constexpr double kLeastOverlap = 1.0 / 3;
+
+std::string named(const CameraGroup& group) {
+  return group.second ? fmt::format("cameras {} and {} as left and right: ", group.first, *group.second)
+                      : fmt::format("camera {}: ", group.first);
+}
+
 /// Lines of a calibration name the group's cameras cam0 and cam1, and their masks mask0 and mask1.
 std::string renumbered(const std::string& lines, const CameraGroup& group) {
   std::string out;
@@ -51,8 +59,7 @@ std::optional<StereoFrame> frame_of_group(const StereoFrame& frame, const Camera
 }
 
 void add_group(const Diagnosis& found, const CameraGroup& group, bool first, Diagnosis& all) {
-  const std::string who = group.second ? fmt::format("cameras {} and {} as left and right: ", group.first, *group.second)
-                                       : fmt::format("camera {}: ", group.first);
+  const std::string who = named(group);
   for (Finding finding : found.findings) {
     const bool of_all = concerns_all_groups(finding.kind);
     if (of_all && !first) continue;
@@ -78,6 +85,40 @@ void add_group(const Diagnosis& found, const CameraGroup& group, bool first, Dia
     cameras.back().camera.set_own_times(all.rig.camera(i).own_times());
   }
   all.rig = with_cameras(all.rig, cameras);
+}
+
+std::vector<CameraGroup> pairs_across(const StereoRig& rig) {
+  const std::vector<CameraGroup> groups = camera_groups(rig);
+  const auto cameras_of = [](const CameraGroup& group) {
+    return group.second ? std::vector{group.first, *group.second} : std::vector{group.first};
+  };
+  std::vector<CameraGroup> out;
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    for (std::size_t k = i + 1; k < groups.size(); ++k) {
+      CameraGroup pair;
+      double most = kLeastOverlap;
+      for (const int a : cameras_of(groups[i]))
+        for (const int b : cameras_of(groups[k]))
+          if (const double share = overlap(rig, a, b); share > most) most = share, pair = {a, b};
+      if (pair.second) out.push_back(pair);
+    }
+  return out;
+}
+
+void add_across(const Diagnosis& found, const CameraGroup& pair, Diagnosis& all) {
+  using enum FindingKind;
+  const std::string who = named(pair);
+  for (Finding finding : found.findings) {
+    if (finding.kind != right_camera_turned && finding.kind != baseline_direction && finding.kind != epipolar_error) continue;
+    finding.measured = who + finding.measured;
+    finding.advice = "a camera or a pair has moved against the other: calibrate all cameras in one, and make their mount stiffer";
+    finding.corrected.clear();
+    finding.fields.clear();
+    all.findings.push_back(std::move(finding));
+  }
+  if (found.epipolar_px)
+    all.measured.push_back(who + fmt::format("matches lie {:.2f} px from their epipolar lines", *found.epipolar_px));
+  else all.not_judged.push_back(who + "how they stand to each other, as too few points are seen in both, or not at one moment");
 }
 
 }  // namespace fbvins

@@ -65,6 +65,34 @@ TEST(RigDiagnosis, FindingsHaveTheNumbersOfTheirCamerasAndTheImuIsJudgedOnce) {
   EXPECT_TRUE(!all.masks[0] && !all.masks[1] && all.masks[2] && all.masks[3]);
 }
 
+TEST(RigDiagnosis, CamerasOfDifferentGroupsThatOverlapAreComparedByTheirEpipolarLines) {
+  const StereoRig apart = quad();
+  EXPECT_TRUE(pairs_across(apart).empty());
+  StereoRig rig = apart;  // and one beside the pair ahead
+  rig.more.push_back({rig.left, {Quat::Identity(), Vec3(0.3, 0, 0)}});
+  const std::vector<CameraGroup> pairs = pairs_across(rig);
+  ASSERT_EQ(pairs.size(), 1u);
+  EXPECT_EQ(pairs[0].first, 2);
+  EXPECT_EQ(pairs[0].second, 4);
+
+  using enum FindingKind;
+  Diagnosis all;
+  all.rig = rig;
+  Diagnosis across = with(rig_of(rig, pairs[0]), {gyro_units, right_camera_turned, focal_length});
+  across.epipolar_px = 2.5;
+  across.rig.right = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
+  add_across(across, pairs[0], all);
+  ASSERT_EQ(all.findings.size(), 1u);
+  EXPECT_EQ(all.findings[0].measured, "cameras 2 and 4 as left and right: it is so");
+  EXPECT_EQ(all.findings[0].corrected, "");
+  EXPECT_EQ(all.rig.camera(4).focal_px(), 300);
+  EXPECT_EQ(all.measured,
+            std::vector<std::string>{"cameras 2 and 4 as left and right: matches lie 2.50 px from their epipolar lines"});
+  across.epipolar_px.reset();
+  add_across(across, pairs[0], all);
+  EXPECT_EQ(all.not_judged.size(), 1u);
+}
+
 /// A recording without any event: only which cameras are examined shows.
 TEST(RigDiagnosis, EachPairIsExaminedAndEachCameraWithoutAPartner) {
   StereoRig rig = quad();

@@ -25,8 +25,8 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kTrouble_s = 2;
 /// Otherwise so many times what a good pose may owe is made up for at once.
 constexpr double kAtOnce = 2;
-/// Of a start with one camera.
-constexpr double kMaxScaleSigmaAtStart = 0.1;
+/// Of a start with one camera; and the slowest motion that shows the scale.
+constexpr double kMaxScaleSigmaAtStart = 0.1, kShowsScale_mps = 0.2;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
 constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
@@ -145,7 +145,7 @@ void Estimator::open_window(const InitialSolution& start) {
   monitor_.restart();
   carried_.begin_window();
   frames_with_readings_ = kFramesAfterGap;
-  up_sigma_rad_ = 0;
+  up_sigma_rad_ = scale_known_ = 0;
 }
 
 /// From here on each observation knows when and from where it was seen (S1-S4).
@@ -275,6 +275,9 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg) + axis_covariance(mean_rate_B(window_.frames()).norm());
   out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_covariance(options_.gravity_mps2);
   up_sigma_rad_ = up_sigma_rad(*covariance);
+  if (one_camera_ && level_state.v_FB.norm() > kShowsScale_mps)
+    scale_known_ = scale_sigma_of(level_state.v_FB, out.velocity_covariance);
+  out.scale_sigma = scale_known_;
 }
 
 void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {

@@ -107,6 +107,7 @@ class Estimator {
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();
   double up_sigma_rad_ = 0;  ///< as of the last usable solve
+  double scale_known_ = 0;   ///< with one camera: its relative standard deviation when the motion last showed it
   PublishedPose published_;
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number

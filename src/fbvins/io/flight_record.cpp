@@ -85,6 +85,7 @@ RosDiagnostic diagnostic_of(const Odometry& o) {
            {"standstill", s.standstill ? "yes" : "no"},
            {"level", o.level ? "yes" : "no"},
            {"tilt_sigma_rad", fmt::format("{:.6f}", o.tilt_sigma_rad)},
+           {"scale_sigma", fmt::format("{:.6f}", o.scale_sigma)},
            {"frames_in_window", fmt::to_string(s.frames_in_window)},
            {"landmarks", fmt::to_string(s.landmarks)},
            {"known_landmarks", fmt::to_string(s.known_landmarks)},

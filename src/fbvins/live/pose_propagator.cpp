@@ -77,6 +77,7 @@ LivePose PosePropagator::newest_pose(Time t, const Vec3& gyro_radps) const {
   pose.reset_counter = estimate_->reset_counter;
   pose.tilt_sigma_rad = estimate_->tilt_sigma_rad;
   pose.level = estimate_->level;
+  pose.scale_sigma = estimate_->scale_sigma;
   if (!since_) {
     if (pose.health.has_pose()) pose.health = {HealthState::lost, HealthReason::no_images};
     return pose;

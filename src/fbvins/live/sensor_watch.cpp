@@ -28,18 +28,21 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
   else if (blind_s > silent_s) reason = HealthReason::no_images;
   else if (silent != 0) reason = HealthReason::one_camera;
   if (reason == HealthReason::none) return said;
-  if (!said.has_pose()) return reason == HealthReason::one_camera ? said : Health{said.state, reason};
+  const auto worse = [&](HealthState state, HealthReason why, unsigned without = 0) {
+    return Health{state, why, static_cast<std::uint8_t>(without), said.covered_percent};
+  };
+  if (!said.has_pose()) return reason == HealthReason::one_camera ? said : worse(said.state, reason);
   if (blind_s > silent_s) {
     const double blind2 = estimated.newest_sigma_m * estimated.newest_sigma_m - estimated.sigma_m * estimated.sigma_m;
-    if (blind2 > max_blind_m_ * max_blind_m_) return {HealthState::lost, HealthReason::no_images};
+    if (blind2 > max_blind_m_ * max_blind_m_) return worse(HealthState::lost, HealthReason::no_images);
     // Images that come wait for readings that do not, and go on without them.
     if (silence_s(arrivals.imu) > max_imu_gap_s_ && silence_s(arrivals.image) > silent_s)
-      return {HealthState::lost, HealthReason::imu_gap};
+      return worse(HealthState::lost, HealthReason::imu_gap);
   }
   // Images come, and their estimates are late: the estimator knows why, where it waits for readings.
   const bool images_come = reason == HealthReason::no_images && silence_s(arrivals.image) <= silent_s;
   if (images_come && said.state == HealthState::degraded) return said;
-  return {HealthState::degraded, reason, static_cast<std::uint8_t>(reason == HealthReason::one_camera ? silent : 0)};
+  return worse(HealthState::degraded, reason, reason == HealthReason::one_camera ? silent : 0);
 }
 
 }  // namespace fbvins

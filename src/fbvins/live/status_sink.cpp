@@ -28,6 +28,7 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
   json["health"] = to_string(status.health.state);
   json["reason"] = to_string(status.health.reason);
   if (status.health.without_cameras != 0) json["without_cameras"] = cameras_in(status.health.without_cameras);
+  if (const auto covered = covered_percent_of(status.health); !covered.empty()) json["covered_percent"] = covered;
   json["reset_counter"] = status.reset_counter;
   if (newest.health.has_pose()) {
     const Vec3& p = newest.T_WB.p;
@@ -37,6 +38,7 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
     json["velocity_mps"] = {newest.v_WB.x(), newest.v_WB.y(), newest.v_WB.z()};
     json["tilt_sigma_rad"] = newest.tilt_sigma_rad;
     json["level"] = newest.level;
+    if (newest.scale_sigma > 0) json["scale_sigma"] = newest.scale_sigma;
     json["protection_m"] = protection_level_m(newest.health, newest.pose_covariance);
     json["quality_percent"] = quality_percent(newest.health, newest.pose_covariance);
   }

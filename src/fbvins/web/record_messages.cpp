@@ -101,6 +101,7 @@ bool take_record_health(const RosDiagnostic& diagnostic, Odometry& o) {
   take_number(diagnostic, "reset_counter", o.reset_counter);
   take_number(diagnostic, "frame", o.id.value);
   take_number(diagnostic, "tilt_sigma_rad", o.tilt_sigma_rad);
+  take_number(diagnostic, "scale_sigma", o.scale_sigma);
   o.level = text_at(diagnostic, "level") == "yes";
   EstimatorStats& s = o.stats;
   s.keyframe = text_at(diagnostic, "keyframe") == "yes";

@@ -40,6 +40,9 @@ struct CameraModelOptions {
   double later_ms = 0;
   int legs = 0;
   int propellers = 0;
+  int dirt = 0;
+  double dirt_from_s = 0;
+  double dirt_until_s = 1e6;
 
   template <class V>
   void visit(V&& v) {
@@ -70,6 +73,9 @@ struct CameraModelOptions {
       "each camera but the first takes its images this much later than the one before it, with the same stamps", 0.0, 10.0);
     v("legs", legs, "", "legs of the vehicle in the view of each camera, at the same pixels in every image", 0, 6);
     v("propellers", propellers, "", "turning propellers in the view of each camera, in its upper corners", 0, 2);
+    v("dirt", dirt, "", "blots and hairs on the lens of the first camera, out of focus", 0, 6);
+    v("dirt_from_s", dirt_from_s, "s", "when the dirt comes, since the start", 0.0, 1e6);
+    v("dirt_until_s", dirt_until_s, "s", "when it is wiped off", 0.0, 1e6);
   }
 };
 
