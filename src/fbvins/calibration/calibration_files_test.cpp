@@ -64,8 +64,10 @@ TEST(CalibrationFiles, ARollingShutterThatIsFoundIsWritten) {
   CameraCalibration cameras;
   CameraImuResult imu;
   for (std::size_t k = 0; k < 2; ++k) {
-    cameras.cameras.push_back({.camera = rig.cameras[k], .T_CnC0 = rig.T_CnC0[k]});
-    imu.cameras.push_back({.T_BC = rig.T_BC[k], .later_s = k == 0 ? 0 : 0.002});
+    CalibratedCamera& camera = cameras.cameras.emplace_back();
+    camera.camera = rig.cameras[k], camera.T_CnC0 = rig.T_CnC0[k];
+    CameraOnImu& mounted = imu.cameras.emplace_back();
+    mounted.T_BC = rig.T_BC[k], mounted.later_s = k == 0 ? 0 : 0.002;
   }
   imu.time_offset_s = 0.0123, imu.line_delay_s = 4.1e-5;
   const RigCalibration found = rig_calibration(cameras, imu, {});

@@ -112,6 +112,8 @@ struct CameraImuResult {
   Eigen::MatrixXd covariance;  ///< of `parameters`
   std::vector<ViewFit> view_fits;
   std::vector<ReadingFit> reading_fits;
+  /// With a line delay: the views as they would be, had all rows been exposed with the middle one; corners that the fit uses.
+  std::vector<BoardView> global_views;
 };
 
 /// An error, one sentence, where the recording does not determine what is asked for or contradicts itself.
