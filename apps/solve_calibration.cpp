@@ -38,7 +38,10 @@ class RigSolver {
     outcome_.board = board_;
     outcome_.remarks = material_.remarks;
     if (Result<void> done = calibrate_lenses(material_.detections); !done) return done.error();
-    if (material_.imu.empty()) return std::move(outcome_);
+    if (material_.imu.empty()) {
+      say_what_cameras_cannot_see();
+      return std::move(outcome_);
+    }
     tell(fmt::format("cameras on the IMU: {} readings", material_.imu.size()));
     outcome_.imu_noise = noise_of(material_, outcome_.remarks);
     if (Result<void> done = mount_on_imu(); !done) return done.error();
@@ -56,6 +59,13 @@ class RigSolver {
  private:
   void tell(const std::string& what) const {
     if (options_.on_progress) options_.on_progress(what);
+  }
+
+  void say_what_cameras_cannot_see() {
+    outcome_.remarks.push_back(fmt::format(
+        "all lengths are those of the board's file ({:g} mm): without an IMU nothing shows whether the print has them, "
+        "so measure it; a baseline is wrong by the same factor",
+        1e3 * board_.size_m));
   }
 
   Result<void> calibrate_lenses(const Detections& detections) {
