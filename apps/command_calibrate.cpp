@@ -14,13 +14,13 @@
 #include "apps/open_cameras.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_output.hpp"
+#include "apps/solve_calibration.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/board_detector.hpp"
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/imu_noise.hpp"
 #include "fbvins/calibration/target_file.hpp"
-#include "fbvins/imu/reading_rate.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/imu_file.hpp"
@@ -55,11 +55,7 @@ struct Arguments {
 };
 
 /// What is calibrated from.
-struct Material {
-  Detections detections;
-  std::vector<ImuSample> imu;
-  std::optional<ImuNoise> imu_noise;
-  std::vector<std::string> remarks;
+struct Material : CalibrationMaterial {
   int stopped_after = -1;  ///< images, where the search for the board was interrupted: there is nothing else then
 };
 
@@ -90,7 +86,7 @@ Result<Material> detect(const Arguments& a, const Board& board) {
   options.stop = stop_is_wanted;
   Result<BoardSearch> found = detect_board(board, *recording, options);
   if (!found) return Error{found.error().code, fmt::format("{}: {}", a.recording, found.error().message)};
-  Material out{std::move(found->detections), recording->imu, recording->imu_noise, {}, found->stopped_after};
+  Material out{{std::move(found->detections), recording->imu, recording->imu_noise, {}}, found->stopped_after};
   if (found->unreadable > 0)
     out.remarks.push_back(fmt::format("{} images could not be read, the first: {}", found->unreadable, found->first_unreadable));
   return out;
@@ -170,16 +166,6 @@ Result<Material> gather(const Arguments& a, const Board& board, GuidedCalibratio
   return out;
 }
 
-/// With the measured rate, on which the noise of a single reading depends.
-ImuNoise noise_of(const Material& material, std::vector<std::string>& remarks) {
-  if (!material.imu_noise)
-    remarks.push_back(
-        "no noise of the IMU is given (--imu-calibration): the defaults are taken, and the weight of its readings follows their residuals");
-  ImuNoise noise = material.imu_noise.value_or(ImuNoise{});
-  if (const double rate_hz = rate_hz_of(material.imu); rate_hz > 0) noise.rate_hz = rate_hz;
-  return noise;
-}
-
 /// Refused input: it could be read, but does not determine what is asked for.
 int refuse(const Arguments& a, const Error& error) {
   fail(error.message);
@@ -188,37 +174,10 @@ int refuse(const Arguments& a, const Error& error) {
   return kEstimationFailed;
 }
 
-/// Cameras, then the IMU. An error where the material does not determine what is asked for.
 Result<CalibrationOutcome> solve(const Arguments& a, const Board& board, const Material& material) {
-  CalibrationOutcome outcome;
-  outcome.board = board;
-  outcome.remarks = material.remarks;
-  CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
-  if (!a.quiet) options.on_progress = [](const std::string& what) { note(what); };
-  // Cameras that never see the board together, or not at one time, are joined by the IMU, if there is one.
-  const bool connected = cameras_connected(material.detections, board, options.pair_tolerance_s);
-  const bool apart = !material.imu.empty() && (a.imu_options.camera_offsets || !connected);
-  Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material.detections, board, options)
-                                            : calibrate_cameras(material.detections, board, options);
-  if (!cameras) return cameras.error();
-  outcome.cameras = *std::move(cameras);
-  if (material.imu.empty()) return outcome;
-  if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material.imu.size()));
-  outcome.imu_noise = noise_of(material, outcome.remarks);
-  ImuCameraInput input{
-      board, {}, {}, material.detections.views, material.imu, outcome.imu_noise, rig_variations(outcome.cameras)};
-  for (const CalibratedCamera& camera : outcome.cameras.cameras) {
-    input.cameras.push_back(camera.camera);
-    if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
-  }
-  Result<CameraImuResult> imu = calibrate_imu_camera(input, a.imu_options);
-  if (!imu) return Error{imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"};
-  for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
-    outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
-  if (!connected && apart)
-    outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
-  outcome.imu = *std::move(imu);
-  return outcome;
+  CameraCalibrationOptions cameras{.models = a.models, .max_views = a.max_views};
+  if (!a.quiet) cameras.on_progress = [](const std::string& what) { note(what); };
+  return solve_calibration(board, material, cameras, a.imu_options);
 }
 
 Result<void> write_outcome(const Arguments& a, CalibrationOutcome& outcome) {

@@ -82,6 +82,9 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->add_option("--later", a->options.later_ms, "ms by which each camera takes its image later than the one before it")
       ->check(CLI::Range(-40.0, 40.0))
       ->capture_default_str();
+  command->add_option("--line-delay", a->options.line_delay_us, "us from row to row of a rolling shutter")
+      ->check(CLI::Range(0.0, 200.0))
+      ->capture_default_str();
   command
       ->add_option("--motion", a->movements, "the hand's only movements: distance, across, up, aim (at the board's parts), roll")
       ->delimiter(',')

@@ -77,11 +77,27 @@ def check_record(board, folder, rig):
     fbvins("convert", board, record)
     fbvins("calibrate", record, "--topics", "/camera/right", "--cameras-only", "--target", board / "target.yaml", "--save-detections", "--out", out)
     rows = [line.split(",") for line in (rig / "detections.csv").read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    # Cameras alone do not measure the board, and say so.
+    assert any("all lengths are those of the board's file (88 mm)" in remark for remark in summary_of(out)["remarks"]), summary_of(out)["remarks"]
     found = [line.split(",") for line in (out / "detections.csv").read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
     assert found == [[t, "0", *rest] for t, camera, *rest in rows if camera == "1"] != []
     refused = subprocess.run([PROGRAM, "calibrate", record, "--topics", "/left", "--target", board / "target.yaml", "--out", out],
                              capture_output=True, text=True, timeout=60, check=False)
     assert refused.returncode == 2 and "there are images on /camera/left, /camera/right, readings on /imu" in refused.stderr, refused
+
+
+def check_rolling(folder):
+    """The line delay is found and written, with the time offset of the middle row; lenses are those of a global shutter."""
+    board, rig = folder / "rolling_board", folder / "rolling_rig"
+    fbvins("simulate", "board", "--cameras", 1, "--seconds", 9, "--rate", 5, "--seed", 4, "--line-delay", 20, "--out", board)
+    fbvins("calibrate", board, "--target", board / "target.yaml", "--line-delay", "--out", rig)
+    camchain = (rig / "camchain-imucam.yaml").read_text(encoding="utf-8")
+    delay_s, offset_s = (float(re.search(rf"{key}: (\S+)", camchain)[1]) for key in ("line_delay", "timeshift_cam_imu"))
+    assert abs(delay_s - 20e-6) < 0.3e-6 and abs(offset_s - 0.005) < 1e-4, camchain  # the first row's is 4.8 ms earlier
+    found = summary_of(rig)["parameters"]
+    assert abs(found["cam0.fx"]["value"] - 458.7) < 0.2, found["cam0.fx"]
+    shown = subprocess.run([PROGRAM, "info", board, "--calibration", rig / "camchain-imucam.yaml"], capture_output=True, text=True, timeout=60, check=True)
+    assert re.search(r"line delay (19\.[789]|20\.[012])", shown.stdout), shown.stdout
 
 
 def main():
@@ -91,6 +107,7 @@ def main():
         fbvins("simulate", "board", "--seconds", "8", "--rate", "5", "--seed", "3", "--out", board)
         fbvins("calibrate", board, "--target", board / "target.yaml", "--save-detections", "--out", rig)
         check_truth(summary_of(rig))
+        check_rolling(folder)
         if pathlib.Path(PROGRAM).with_name("fbvins-bags").exists():
             check_bag(board, folder, rig)
             check_record(board, folder, rig)

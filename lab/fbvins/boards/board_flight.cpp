@@ -49,10 +49,10 @@ double room(const Vec3& origin_T, const Vec3& direction_T) {
 }
 
 /// Poses of the board at four instants of the exposure, about its middle.
-std::vector<Pose<Cn, T>> poses(const SplineTrajectory& hand, const Pose<W, T>& T_WT, const Pose<B, Cn>& T_BC, double middle_s,
-                               double exposure_s) {
+BoardCamera::Instants poses(const SplineTrajectory& hand, const Pose<W, T>& T_WT, const Pose<B, Cn>& T_BC, double middle_s,
+                            double exposure_s) {
   constexpr int kInstants = 4;
-  std::vector<Pose<Cn, T>> out;
+  BoardCamera::Instants out;
   for (int i = 0; i < kInstants; ++i)
     out.push_back((hand.pose(middle_s + exposure_s * ((i + 0.5) / kInstants - 0.5)) * T_BC).inverse() * T_WT);
   return out;
@@ -108,7 +108,7 @@ Result<StereoRig> board_flight_rig(const BoardFlightOptions& options) {
       mounted[k].camera.set_own_times({1e-3 * options.later_ms * static_cast<double>(k), 0});
     rig = with_cameras(std::move(rig), mounted);
     rig.image_rate_hz = options.image_rate_hz;
-    rig.time_offset_s = 1e-3 * options.time_offset_ms;
+    rig.time_offset_s = 1e-3 * options.time_offset_ms, rig.line_delay_s = 1e-6 * options.line_delay_us;
     return rig;
   }
   return Error{ErrorCode::invalid_argument,
@@ -139,8 +139,13 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
       Rng rng(seed, k < 2 ? static_cast<std::uint64_t>(2 * i + k + 1)
                           : static_cast<std::uint64_t>(k) << 32 | static_cast<std::uint64_t>(i));
       const Pose<B, Cn> T_BC = rig->T_BC(k).cast_frames<B, Cn>();
-      return std::make_shared<const Image>(cameras[static_cast<std::size_t>(k)].render(
-          poses(hand, T_WT, T_BC, middle_s + rig->camera(k).own_times().time_offset_s, exposure_s), look, rng));
+      const auto at = [&](double later_s) {
+        return poses(hand, T_WT, T_BC, middle_s + rig->camera(k).own_times().time_offset_s + later_s, exposure_s);
+      };
+      const BoardCamera& camera = cameras[static_cast<std::size_t>(k)];
+      if (rig->line_delay_s == 0) return std::make_shared<const Image>(camera.render(at(0), look, rng));
+      const auto of_row = [&](int row) { return at((row - 0.5 * rig->camera(k).height()) * rig->line_delay_s); };  // U4
+      return std::make_shared<const Image>(camera.render(of_row, look, rng));
     };
     std::vector<std::future<std::shared_ptr<const Image>>> others;
     for (int k = 1; k < rig->camera_count(); ++k) others.push_back(std::async(std::launch::async, take, k));

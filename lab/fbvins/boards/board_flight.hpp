@@ -27,6 +27,7 @@ struct BoardFlightOptions {
   double noise = 2;           ///< of a grey value, standard deviation
   double time_offset_ms = 5;  ///< stamp of the IMU less that of the image at the same instant
   double later_ms = 0;        ///< so much later than the one before it each camera takes its image, which has the same stamp
+  double line_delay_us = 0;   ///< from row to row of a rolling shutter; the image's stamp is its middle row's
   int seed = 1;
   std::vector<int> missing_tags = {};  ///< places of the board that stay white
   HandMotion motion = {};              ///< for recordings that do not determine a calibration

@@ -65,35 +65,52 @@ bool BoardCamera::near_board(const Vec3& origin_T, const Mat3& R_TC, const Vec3*
   return false;
 }
 
-Image BoardCamera::render(const std::vector<Pose<Cn, T>>& T_CnT, const BoardImageOptions& options, Rng& rng) const {
-  std::vector<Vec3> origins;
-  std::vector<Mat3> rotations;
+BoardCamera::Eyes::Eyes(const Instants& T_CnT) {
   for (const auto& pose : T_CnT) {
     origins.push_back(pose.inverse().p);
     rotations.push_back(pose.R().transpose());
   }
+}
+
+Image BoardCamera::render(const Instants& T_CnT, const BoardImageOptions& options, Rng& rng) const {
+  const Eyes eyes(T_CnT);
   std::vector<double> light(static_cast<std::size_t>(width_) * height_, 0);
-  for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x) {
-      const Vec3 *above = &rays_[y * (width_ + 1) + x], *below = above + width_ + 1;
-      if (above[0].isZero() || above[1].isZero() || below[0].isZero() || below[1].isZero()) continue;
-      if (!near_board(origins[0], rotations[0], above, below)) {
-        const Vec3 middle = 0.25 * (above[0] + above[1] + below[0] + below[1]);
-        light[y * width_ + x] = grey(origins[0], rotations[0] * middle, options);
-        continue;
-      }
-      double sum = 0;
-      const double shift = ((x * 7 + y * 11) % 16) / 16.0;
-      for (int s = 0; s < kSamples; ++s) {
-        // Every sample in a column and a row of its own, shifted from pixel to pixel: also edges along rows are where they are.
-        const double fx = (s + shift) / kSamples, fy = (s * 7 % kSamples + shift) / kSamples;
-        const Vec3 ray = (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) + fy * ((1 - fx) * below[0] + fx * below[1]);
-        // Instants take turns over the samples, so that each has samples all over the pixel.
-        const std::size_t instant = static_cast<std::size_t>(s + s / 4) % origins.size();
-        sum += grey(origins[instant], rotations[instant] * ray, options);
-      }
-      light[y * width_ + x] = sum / kSamples;
+  for (int y = 0; y < height_; ++y) light_of_row(y, eyes, options, &light[static_cast<std::size_t>(y) * width_]);
+  return exposed(std::move(light), options, rng);
+}
+
+Image BoardCamera::render(const std::function<Instants(int row)>& T_CnT_of_row, const BoardImageOptions& options,
+                          Rng& rng) const {
+  std::vector<double> light(static_cast<std::size_t>(width_) * height_, 0);
+  for (int y = 0; y < height_; ++y) light_of_row(y, Eyes(T_CnT_of_row(y)), options, &light[static_cast<std::size_t>(y) * width_]);
+  return exposed(std::move(light), options, rng);
+}
+
+void BoardCamera::light_of_row(int y, const Eyes& eyes, const BoardImageOptions& options, double* light) const {
+  const auto& [origins, rotations] = eyes;
+  for (int x = 0; x < width_; ++x) {
+    const Vec3 *above = &rays_[y * (width_ + 1) + x], *below = above + width_ + 1;
+    if (above[0].isZero() || above[1].isZero() || below[0].isZero() || below[1].isZero()) continue;
+    if (!near_board(origins[0], rotations[0], above, below)) {
+      const Vec3 middle = 0.25 * (above[0] + above[1] + below[0] + below[1]);
+      light[x] = grey(origins[0], rotations[0] * middle, options);
+      continue;
     }
+    double sum = 0;
+    const double shift = ((x * 7 + y * 11) % 16) / 16.0;
+    for (int s = 0; s < kSamples; ++s) {
+      // Every sample in a column and a row of its own, shifted from pixel to pixel: also edges along rows are where they are.
+      const double fx = (s + shift) / kSamples, fy = (s * 7 % kSamples + shift) / kSamples;
+      const Vec3 ray = (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) + fy * ((1 - fx) * below[0] + fx * below[1]);
+      // Instants take turns over the samples, so that each has samples all over the pixel.
+      const std::size_t instant = static_cast<std::size_t>(s + s / 4) % origins.size();
+      sum += grey(origins[instant], rotations[instant] * ray, options);
+    }
+    light[x] = sum / kSamples;
+  }
+}
+
+Image BoardCamera::exposed(std::vector<double> light, const BoardImageOptions& options, Rng& rng) const {
   if (options.blur_px > 0) {
     const std::vector<double> kernel = gaussian(options.blur_px);
     light = blurred_and_turned(blurred_and_turned(light, width_, height_, kernel), height_, width_, kernel);

@@ -29,10 +29,23 @@ class BoardCamera {
 
   BoardCamera(const Camera& camera, BoardPattern pattern, Background background = {});
 
-  /// Poses at instants of the exposure: more than one blurs by motion.
-  Image render(const std::vector<Pose<Cn, T>>& T_CnT, const BoardImageOptions& options, Rng& rng) const;
+  /// Poses at instants of an exposure.
+  using Instants = std::vector<Pose<Cn, T>>;
+
+  /// More than one instant blurs by motion.
+  Image render(const Instants& T_CnT, const BoardImageOptions& options, Rng& rng) const;
+  /// The same by a rolling shutter, which exposes each row at its own instants: as many for every row.
+  Image render(const std::function<Instants(int row)>& T_CnT_of_row, const BoardImageOptions& options, Rng& rng) const;
 
  private:
+  /// Where a row's instants are, and how they look, in the board's frame.
+  struct Eyes {
+    explicit Eyes(const Instants& T_CnT);
+    std::vector<Vec3> origins;
+    std::vector<Mat3> rotations;
+  };
+  void light_of_row(int y, const Eyes& eyes, const BoardImageOptions& options, double* light) const;
+  Image exposed(std::vector<double> light, const BoardImageOptions& options, Rng& rng) const;
   double grey(const Vec3& origin_T, const Vec3& direction_T, const BoardImageOptions& options) const;
 
   bool near_board(const Vec3& origin_T, const Mat3& R_TC, const Vec3* above, const Vec3* below) const;

@@ -80,7 +80,7 @@ RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImu
     out.T_BC.push_back(camera.T_BC);
     out.cameras[k].set_own_times({camera.later_s, 0});
   }
-  out.time_offset_s = imu.time_offset_s;
+  out.time_offset_s = imu.time_offset_s, out.line_delay_s = imu.line_delay_s;
   out.imu_noise = noise;
   return out;
 }

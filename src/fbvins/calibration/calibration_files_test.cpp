@@ -59,6 +59,27 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   EXPECT_EQ(noise->max_accel_mps2, 80);
 }
 
+TEST(CalibrationFiles, ARollingShutterThatIsFoundIsWritten) {
+  const RigCalibration rig = rig_with(example_cameras()[0]);
+  CameraCalibration cameras;
+  CameraImuResult imu;
+  for (std::size_t k = 0; k < 2; ++k) {
+    CalibratedCamera& camera = cameras.cameras.emplace_back();
+    camera.camera = rig.cameras[k], camera.T_CnC0 = rig.T_CnC0[k];
+    CameraOnImu& mounted = imu.cameras.emplace_back();
+    mounted.T_BC = rig.T_BC[k], mounted.later_s = k == 0 ? 0 : 0.002;
+  }
+  imu.time_offset_s = 0.0123, imu.line_delay_s = 4.1e-5;
+  const RigCalibration found = rig_calibration(cameras, imu, {});
+  for (const std::string& text : {to_kalibr_camchain(found), to_kalibr_rig(found)}) {
+    const auto read = parse_kalibr_camchain({"camchain-imucam.yaml", text});
+    ASSERT_TRUE(read) << read.error().message;
+    for (int k = 0; k < 2; ++k) EXPECT_DOUBLE_EQ(read->times(k).line_delay_s, 4.1e-5);
+    EXPECT_DOUBLE_EQ(read->times(0).time_offset_s, 0.0123);
+    EXPECT_DOUBLE_EQ(read->times(1).time_offset_s, 0.0143);
+  }
+}
+
 /// Kalibr's reader (kalibr_common/ConfigReader.py) asks for as many coefficients as the model has, and for floating point
 /// numbers.
 TEST(CalibrationFiles, KalibrsReaderTakesWhatIsWritten) {

@@ -85,8 +85,9 @@ struct CalibratedParameter {
 struct CameraImuResult {
   std::vector<CameraOnImu> cameras;
   double time_offset_s = 0, time_offset_sigma_s = 0;  ///< t_imu = t_image + time_offset_s
-  double line_delay_s = 0, line_delay_sigma_s = 0;    ///< a row is exposed at t_image + time_offset_s + row * line_delay_s
-  Vec3 gravity_T = Vec3::Zero();                      ///< in the board's frame, m/s^2
+  /// Row v is exposed at t_image + time_offset_s + (v - height / 2) * line_delay_s (U4).
+  double line_delay_s = 0, line_delay_sigma_s = 0;
+  Vec3 gravity_T = Vec3::Zero();  ///< in the board's frame, m/s^2
   Mat3 gravity_covariance = Mat3::Zero();
   ImuTriads axes, axes_sigma;
   std::vector<BiasAt> biases;
@@ -111,6 +112,8 @@ struct CameraImuResult {
   Eigen::MatrixXd covariance;  ///< of `parameters`
   std::vector<ViewFit> view_fits;
   std::vector<ReadingFit> reading_fits;
+  /// With a line delay: the views as they would be, had all rows been exposed with the middle one; corners that the fit uses.
+  std::vector<BoardView> global_views;
 };
 
 /// An error, one sentence, where the recording does not determine what is asked for or contradicts itself.

@@ -122,11 +122,12 @@ std::vector<CalibrationView> views_of(const ImuCameraInput& input, const BoardVi
   std::vector<CalibrationView> out(static_cast<std::size_t>(groups), {view.camera, t_s, 0, 1, 1, {}});
   for (const BoardCorner& corner : view.corners) {
     const int group = std::clamp(static_cast<int>(corner.pixel.y() / height * groups), 0, groups - 1);
-    out[static_cast<std::size_t>(group)].corners.push_back({corner.index, input.board.corner(corner.index), corner.pixel});
+    out[static_cast<std::size_t>(group)].corners.push_back(
+        {corner.index, input.board.corner(corner.index), corner.pixel, corner.pixel.y() - 0.5 * height});
   }
   std::erase_if(out, [](const CalibrationView& v) { return v.corners.empty(); });
   for (CalibrationView& v : out) {
-    for (const WeightedCorner& corner : v.corners) v.row += corner.pixel.y() / static_cast<double>(v.corners.size());
+    for (const WeightedCorner& corner : v.corners) v.row += corner.row / static_cast<double>(v.corners.size());
     if (!by_rows) v.row = 0;
   }
   return out;

@@ -22,6 +22,7 @@ struct WeightedCorner {
   int index = 0;
   Vec3 p_T;
   Vec2 pixel;
+  double row = 0;  ///< from the image's middle downwards, px
   bool used = true;
 };
 
@@ -29,7 +30,7 @@ struct WeightedCorner {
 struct CalibrationView {
   int camera = 0;
   double t_s = 0;  ///< image's stamp since the path's start, without the offset
-  double row = 0;  ///< of the image, exposed line_delay * row later
+  double row = 0;  ///< from the image's middle downwards, exposed line_delay * row later (U4)
   double noise_factor = 1;
   int sharing = 1;  ///< views with this stamp
   std::vector<WeightedCorner> corners;

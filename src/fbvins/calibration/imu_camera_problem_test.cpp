@@ -27,9 +27,9 @@ ImuCameraProblem wild_problem() {
   data.cameras = {test::wide_camera(), test::wide_camera()};
   const Board board;
   for (int v = 0; v < 6; ++v) {
-    CalibrationView view{.camera = v % 2, .t_s = 0.05 * v + 0.02, .row = 200, .corners = {}};
+    CalibrationView view{.camera = v % 2, .t_s = 0.05 * v + 0.02, .row = -40, .corners = {}};
     for (int i = v; i < 140; i += 20)
-      view.corners.push_back({i, board.corner(i), Vec2(300 + 10 * rng.normal(), view.row)});  // in one row: exact derivatives
+      view.corners.push_back({i, board.corner(i), Vec2(300 + 10 * rng.normal(), 240 + view.row), view.row});  // one row: exact
     data.views.push_back(view);
   }
   for (int i = 0; i < 60; ++i)

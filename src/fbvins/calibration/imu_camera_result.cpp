@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace fbvins {
 namespace {
@@ -62,6 +63,29 @@ void tell_cameras(const ImuCameraProblem& problem, const CalibrationStart& start
   }
   for (std::size_t c = 0; c < out.cameras.size(); ++c)
     out.cameras[c].rms_px = std::sqrt(squares[c] / std::max(1.0, 2.0 * out.cameras[c].corners));
+}
+
+/// Seen pixels, moved by what the fit predicts for the middle row's instant and for their own.
+std::vector<BoardView> global_views(const ImuCameraProblem& problem, const CalibrationStart& start) {
+  std::map<std::pair<double, int>, BoardView> images;  // groups of rows together
+  for (const CalibrationView& view : problem.data().views) {
+    BoardView& image = images[{view.t_s, view.camera}];
+    image.t = start.reference + Duration::from_seconds(view.t_s), image.camera = view.camera;
+    CalibrationView middle = view;
+    middle.row = 0;
+    for (WeightedCorner& corner : middle.corners) {
+      const auto own = problem.corner_error(view, corner);
+      corner.row = 0;
+      const auto then = problem.corner_error(middle, corner);
+      if (corner.used && own && then) image.corners.push_back({corner.index, corner.pixel + *then - *own});
+    }
+  }
+  std::vector<BoardView> out;
+  for (auto& [key, image] : images) {
+    std::ranges::sort(image.corners, {}, &BoardCorner::index);
+    if (!image.corners.empty()) out.push_back(std::move(image));
+  }
+  return out;
 }
 
 void tell_readings(const ImuCameraProblem& problem, const CalibrationStart& start, CameraImuResult& out) {
@@ -125,6 +149,7 @@ CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& s
   out.knot_spacing_s = state.path.spacing_s();
   out.duration_s = state.path.duration_s();
   tell_cameras(problem, start, out);
+  if (at.line_delay >= 0) out.global_views = global_views(problem, start);
   tell_readings(problem, start, out);
   return out;
 }

@@ -207,7 +207,7 @@ class HandHeld {
       if (p_C.z() < 0.1) return std::nullopt;
       pixel = lens.project(p_C);
       if (!pixel || !lens.inside(*pixel, -100)) return std::nullopt;
-      row = pixel->y();
+      row = pixel->y() - 0.5 * lens.height();
     }
     if (!lens.inside(*pixel, 4)) return std::nullopt;
     return pixel;

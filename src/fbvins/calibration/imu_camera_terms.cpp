@@ -42,7 +42,7 @@ ImuCameraProblem::ViewMotion ImuCameraProblem::view_motion(const CalibrationView
 std::optional<Vec3> ImuCameraProblem::corner_in_camera(const CalibrationView& view, const WeightedCorner& corner,
                                                        const ViewMotion& motion, double late_s) const {
   Vec3 p_C = motion.T_CT * corner.p_T;
-  late_s += state_.line_delay_s * (corner.pixel.y() - view.row);
+  late_s += state_.line_delay_s * (corner.row - view.row);
   if (late_s != 0) p_C += late_s * (p_C.cross(motion.rate.tail<3>()) - motion.rate.head<3>());
   const Camera& camera = data_.cameras[static_cast<std::size_t>(view.camera)];
   if (p_C.z() < kNearest_m || (p_C.head<2>() / p_C.z()).norm() > camera.max_normalised_radius()) return std::nullopt;
@@ -88,7 +88,7 @@ ImuCameraProblem::ViewTerm ImuCameraProblem::view_term(const CalibrationView& vi
     Eigen::Matrix<double, 2, 7> J;  // (C4)
     J.leftCols<3>() = -J_point;
     J.middleCols<3>(3) = J_point * hat(*p_C);
-    J.col(6) = corner.pixel.y() * J.leftCols<6>() * motion.rate;
+    J.col(6) = corner.row * J.leftCols<6>() * motion.rate;
     term.H += robust.weight * J.transpose() * J;
     term.b += robust.weight * J.transpose() * r;
   }

@@ -8,6 +8,7 @@
 
 #include "fbvins/calibration/imu_camera_scene.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace imu_camera_test {
@@ -124,6 +125,18 @@ TEST(ImuCamera, RollingShutter) {
   expect_truth(r, found, 1e-3, 0.02 * kDegree, 0.05e-3);
   EXPECT_NEAR(found->line_delay_s, o.line_delay_s, 3.5 * found->line_delay_sigma_s);
   EXPECT_LT(found->line_delay_sigma_s, 0.5e-6);
+  // The same moment by moment as a global shutter sees it.
+  o.line_delay_s = 0, o.corner_sigma_px = 0;
+  const HandHeldRecording global = hand_held(o, 5);
+  std::vector<double> off_px;
+  for (const BoardView& view : found->global_views)
+    for (const BoardView& same : global.input.views)
+      if (std::abs((same.t - view.t).ns) < 10)
+        for (const BoardCorner& corner : view.corners)
+          for (const BoardCorner& truth : same.corners)
+            if (truth.index == corner.index) off_px.push_back((truth.pixel - corner.pixel).norm());
+  ASSERT_GT(off_px.size(), 10000u);
+  EXPECT_LT(median_of(off_px), 0.3) << "their noise; as seen the median is several pixels";
 }
 
 TEST(ImuCamera, ScaleAndAxesOfTheImu) {

@@ -32,6 +32,11 @@ constexpr double kMostUnexplained = 0.5;
 constexpr double kLeastAcceleration_mps2 = 0.15;
 /// Other axes must leave less than half of what the delivered ones leave, and so much less of the acceleration.
 constexpr double kAxesLeave = 0.02;
+/// Gravity confirms a bias where it is off by so much, and without the bias by less than this share of it, or by no more than
+/// so many of the bias' largest sigmas.
+constexpr double kGravityOff_mps2 = 0.5, kGravityLeft = 0.5, kGravityLeft_sigmas = 2;
+/// Stretches of a recording agree on an axis better than it is right: good recordings show 1.9 +- 0.03 m/s^2.
+constexpr double kBiasResolution_mps2 = 0.1;
 
 /// Preintegrated readings of a pair: delta_q, and delta_v and delta_p as linear functions of matrix and bias.
 struct PairDeltas {
@@ -256,6 +261,14 @@ AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries&
   fit.acceleration_mps2 = acceleration_of(sums, windows, pairs);
   fit.seen = best.scale > 0 && fit.unexplained < kMostUnexplained && fit.acceleration_mps2 > kLeastAcceleration_mps2;
   return fit;
+}
+
+double bias_significance(const AccelFit& fit, double gravity_off_mps2, double off_without_bias_mps2) {
+  const double largest_sigma = fit.bias_sigma.maxCoeff();
+  const double explained = std::max(kGravityLeft * gravity_off_mps2, kGravityLeft_sigmas * largest_sigma);
+  if (gravity_off_mps2 > kGravityOff_mps2 && off_without_bias_mps2 < std::min(explained, gravity_off_mps2))
+    return fit.bias.cwiseQuotient(fit.bias_sigma.cwiseMax(kBiasResolution_mps2)).norm();
+  return fit.bias.norm() / largest_sigma;
 }
 
 }  // namespace fbvins

@@ -36,4 +36,8 @@ struct AccelFit {
 AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries& imu, const StereoRig& rig,
                            const AccelStart& start);
 
+/// How many standard deviations the bias is from none. By the axes' own ones where gravity confirms it: as read it is off by
+/// `gravity_off_mps2`, without the bias by much less. Else all axes count as the least certain one.
+double bias_significance(const AccelFit& fit, double gravity_off_mps2, double off_without_bias_mps2);
+
 }  // namespace fbvins

@@ -199,6 +199,19 @@ TEST(Doctor, GivesTheCorrectedLine) {
   EXPECT_NEAR(std::stod(finding->corrected.substr(at + 19)), 0.05, 1e-3);
 }
 
+TEST(Doctor, NoOffsetIsOfferedForReadingsInBlocks) {
+  Evidence evidence = good();
+  for (std::size_t i = 0; i < evidence.imu.size(); ++i)  // stamped when the block's last one is measured
+    evidence.imu[i].t = Time{evidence.imu[0].t.ns} + Duration{5'000'000LL * static_cast<std::int64_t>(i / 10 * 10 + 9)} +
+                        Duration{20'000LL * static_cast<std::int64_t>(i % 10)};
+  const Diagnosis diagnosis = examine(evidence);
+  ASSERT_NE(find(diagnosis, FindingKind::imu_stamps), nullptr) << all_of(diagnosis);
+  const Finding* finding = find(diagnosis, FindingKind::time_offset);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_TRUE(finding->corrected.empty()) << finding->corrected;
+  EXPECT_EQ(diagnosis.rig.time_offset_s, evidence.rig.time_offset_s);
+}
+
 TEST(Doctor, NoOffsetIsOfferedForStampsThatVary) {
   Evidence evidence = good();
   for (ImuSample& sample : evidence.imu) sample.t = sample.t + Duration::from_seconds(0.05);

@@ -154,19 +154,20 @@ bool Examination::position(const AccelFit& fit) {
 
 void Examination::accel_bias(const AccelFit& fit) {
   const Vec3& bias = fit.bias;
-  const double sigma = fit.bias_sigma.maxCoeff();
-  if (bias.norm() < kBiasPractical_mps2 || bias.norm() < kSignificant * sigma) return;
+  if (bias.norm() < kBiasPractical_mps2) return;
   // Without its bias an accelerometer reads gravity better. A rig that turns little hardly tells a bias from gravity.
   const auto gravity_error = [&](const Vec3& without) {
     std::vector<ImuSample> samples = evidence_.imu;
     for (ImuSample& sample : samples) sample.accel_mps2 = accel_unit_ * sample.accel_mps2 - without;
     return std::abs(gravity_seen(samples).norm_mps2 - kGravity_mps2);
   };
-  if (gravity_error(bias) > gravity_error(Vec3::Zero()) + kBiasSpares_mps2) {
+  const double as_read = gravity_error(Vec3::Zero()), without = gravity_error(bias);
+  if (bias_significance(fit, as_read, without) < kSignificant) return;
+  if (without > as_read + kBiasSpares_mps2) {
     not_judged("the accelerometer's bias: what the images show of it does not go with the gravity that it reads");
     return;
   }
-  Finding& finding = found(FindingKind::accel_bias, bias.norm(), sigma, "m/s^2");
+  Finding& finding = found(FindingKind::accel_bias, bias.norm(), fit.bias_sigma.maxCoeff(), "m/s^2");
   finding.measured = fmt::format("the accelerometer's bias is ({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", bias.x(), bias.y(),
                                  bias.z(), finding.sigma);
   finding.expected = fmt::format("less than {:.0f} m/s^2", kBiasPractical_mps2);

@@ -253,6 +253,13 @@ void Examination::time_offset(const MotionFit& fit) {
         "stamp the images at the moment of exposure, and examine a new recording: no offset corrects stamps that vary";
     return;
   }
+  const bool in_blocks = std::ranges::any_of(
+      out_.findings, [](const Finding& f) { return f.kind == FindingKind::imu_stamps && f.fields.empty(); });  // no wrong rate
+  if (in_blocks) {
+    finding.advice =
+        "stamp each reading at the moment of measuring, and examine a new recording: no offset corrects stamps that vary";
+    return;
+  }
   finding.advice = "stamp both at the moment of measuring, or give the offset to the calibration";
   finding.fields = {CalibrationField::time_offset};
   rig_.time_offset_s = fit.offset_s;

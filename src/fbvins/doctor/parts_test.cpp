@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "fbvins/doctor/accel_fit.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/block_fit.hpp"
 #include "fbvins/doctor/depths.hpp"
@@ -191,6 +192,21 @@ TEST(MotionProblem, ALensStaysInTheRangeOfItsModel) {
     EXPECT_TRUE(in_range(problem.hypothesis().camera)) << problem.x.transpose();
     EXPECT_GT(alpha + problem.x[doctor::motion::kRadial], 0.98) << "does not reach the end of the range";
   }
+}
+
+TEST(AccelFit, GravityConfirmsABias) {
+  AccelFit spoilt;  // (1, -1, 0.5) m/s^2 put into 12 s of `simulate fast`
+  spoilt.bias = {0.9, -0.87, 0.38}, spoilt.bias_sigma = {0.47, 0.12, 0.15};
+  EXPECT_GT(bias_significance(spoilt, 1.2, 0.3), 5) << "the bias explains what gravity is off by";
+  EXPECT_GT(bias_significance(spoilt, 0.9, 0.6), 5) << "within what the bias' sigmas leave open";
+  EXPECT_LT(bias_significance(spoilt, 0.9, 1.1), 5) << "gravity is farther off without the bias";
+  EXPECT_LT(bias_significance(spoilt, 0.1, 0.8), 5) << "gravity is as it should be";
+  AccelFit good;  // a flight without any bias that could be seen
+  good.bias = {-1.18, -0.46, 1.1}, good.bias_sigma = {1.92, 0.06, 0.18};
+  EXPECT_LT(bias_significance(good, 0.3, 0.1), 5);
+  AccelFit plain;
+  plain.bias = {0, 1.5, 0}, plain.bias_sigma = {0.1, 0.2, 0.1};
+  EXPECT_DOUBLE_EQ(bias_significance(plain, 0.1, 0.1), 7.5) << "large by the least certain axis, too";
 }
 
 }  // namespace parts_test
