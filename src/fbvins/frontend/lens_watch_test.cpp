@@ -35,11 +35,11 @@ const Image& panorama() {
 struct Flight {
   explicit Flight(StereoRig of = rig()) : watch(of) {}
 
-  Vec3 angle(double t_s) const { return swing_rad * Vec3(std::cos(1.3 * t_s), std::sin(1.7 * t_s), 0); }
-  Vec2 shift_px(double t_s) const { return kFocal_px * Vec2(-angle(t_s).y(), angle(t_s).x()); }
+  Vec3 angle(double at_s) const { return swing_rad * Vec3(std::cos(1.3 * at_s), std::sin(1.7 * at_s), 0); }
+  Vec2 shift_px(double at_s) const { return kFocal_px * Vec2(-angle(at_s).y(), angle(at_s).x()); }
 
-  std::shared_ptr<const Image> image(double t_s, bool spot) const {
-    const Vec2 from = kMargin_px * Vec2::Ones() - shift_px(t_s);
+  std::shared_ptr<const Image> image(double at_s, bool spot) const {
+    const Vec2 from = kMargin_px * Vec2::Ones() - shift_px(at_s);
     const int left = static_cast<int>(std::lround(from.x())), top = static_cast<int>(std::lround(from.y()));
     Image out(kWidth, kHeight);
     for (int y = 0; y < kHeight; ++y) std::copy_n(panorama().row(top + y) + left, kWidth, out.row(y));
