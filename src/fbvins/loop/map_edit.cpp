@@ -8,6 +8,7 @@
 #include <map>
 
 #include "fbvins/core/angle.hpp"
+#include "fbvins/loop/map_frame.hpp"
 
 namespace fbvins {
 namespace {
@@ -16,28 +17,13 @@ namespace {
 constexpr double kFits_m = 0.3, kFitsInProportion = 0.05;
 constexpr double kApart_m = 0.5;
 
-struct Centred {
-  Vec3 mean_M = Vec3::Zero(), mean_building = Vec3::Zero();
-  double extent_m = 0;  ///< largest horizontal distance of a point from the mean, in the map
-};
-
-Centred centre_of(const std::vector<SurveyedPoint>& points) {
-  Centred out;
-  const double n = static_cast<double>(points.size());
-  for (const SurveyedPoint& pair : points) out.mean_M += pair.p_M / n, out.mean_building += pair.p_building / n;
-  for (const SurveyedPoint& pair : points) out.extent_m = std::max(out.extent_m, (pair.p_M - out.mean_M).head<2>().norm());
+/// Largest horizontal distance of a point from the mean, in the map.
+double extent_m(const std::vector<SurveyedPoint>& points) {
+  Vec3 mean_M = Vec3::Zero();
+  for (const SurveyedPoint& pair : points) mean_M += pair.p_M / static_cast<double>(points.size());
+  double out = 0;
+  for (const SurveyedPoint& pair : points) out = std::max(out, (pair.p_M - mean_M).head<2>().norm());
   return out;
-}
-
-/// The rotation about the vertical that fits best, in closed form.
-double best_heading(const std::vector<SurveyedPoint>& points, const Centred& centre) {
-  double sine = 0, cosine = 0;
-  for (const SurveyedPoint& pair : points) {
-    const Vec3 a = pair.p_M - centre.mean_M, b = pair.p_building - centre.mean_building;
-    sine += a.x() * b.y() - a.y() * b.x();
-    cosine += a.x() * b.x() + a.y() * b.y();
-  }
-  return std::atan2(sine, cosine);
 }
 
 int loops_of(const PlaceMap& map) {
@@ -61,22 +47,23 @@ Result<MapAlignment> align_map(PlaceMap& map, const std::vector<SurveyedPoint>& 
   if (points.size() < 3) return refuse(fmt::format("{} points are given where three are needed", points.size()));
   for (const SurveyedPoint& pair : points)
     if (!pair.p_M.allFinite() || !pair.p_building.allFinite()) return refuse("a point is not finite");
-  const Centred centre = centre_of(points);
-  if (centre.extent_m < kApart_m)
-    return refuse(fmt::format("the points lie within {:.2f} m of one spot: they do not show a heading", centre.extent_m));
+  const double extent = extent_m(points);
+  if (extent < kApart_m)
+    return refuse(fmt::format("the points lie within {:.2f} m of one spot: they do not show a heading", extent));
+  std::vector<Pose<M, B>> in_map, in_building;  // without attitudes
+  for (const SurveyedPoint& pair : points)
+    in_map.push_back({Quat::Identity(), pair.p_M}), in_building.push_back({Quat::Identity(), pair.p_building});
+  const Pose<M, M> T = nearest_to(in_building, in_map, 0);
   MapAlignment out;
-  out.heading_rad = best_heading(points, centre);
-  const Quat turn(Eigen::AngleAxisd(out.heading_rad, Vec3::UnitZ()));
-  out.moved_m = centre.mean_building - turn * centre.mean_M;
+  out.heading_rad = yaw_of(T.q);
+  out.moved_m = T.p;
   double squares = 0;
-  for (const SurveyedPoint& pair : points) squares += (turn * pair.p_M + out.moved_m - pair.p_building).squaredNorm();
+  for (const SurveyedPoint& pair : points) squares += (T * pair.p_M - pair.p_building).squaredNorm();
   out.rms_m = std::sqrt(squares / static_cast<double>(points.size()));
-  if (out.rms_m > std::max(kFits_m, kFitsInProportion * centre.extent_m))
+  if (out.rms_m > std::max(kFits_m, kFitsInProportion * extent))
     return refuse(fmt::format(
         "the points do not fit: {:.2f} m remain (is one of them in other axes, mirrored, or another point?)", out.rms_m));
-  const Pose<M, M> T(turn, out.moved_m);
-  for (MapKeyframe& k : map.keyframes())
-    if (k.placed) k.T_MB = T * k.T_MB;
+  map.move(T);
   return out;
 }
 

@@ -73,8 +73,11 @@ class Merge {
     std::vector<Tie> ties = tag_ties();
     std::size_t most = 0;
     std::optional<Pose<M, M>> best;
-    for (const Tie& hypothesis : ties)
-      if (const std::size_t n = supporters(ties, hypothesis.T_M1_M2); n > most) most = n, best = hypothesis.T_M1_M2;
+    const auto choose = [&] {
+      for (const Tie& hypothesis : ties)
+        if (const std::size_t n = supporters(ties, hypothesis.T_M1_M2); n > most) most = n, best = hypothesis.T_M1_M2;
+    };
+    choose();
     for (std::size_t i = 0; i < asked && most < kEnough; ++i) {
       MapKeyframe query = second_.keyframes()[i * count / asked];
       query.session = kNoSession;
@@ -83,8 +86,7 @@ class Merge {
         const MapKeyframe& known = *first_.find(id);
         if (const auto verified = verifier_.verify(known.place)) ties.push_back(tie_of(known, query, *verified));
       }
-      for (const Tie& hypothesis : ties)
-        if (const std::size_t n = supporters(ties, hypothesis.T_M1_M2); n > most) most = n, best = hypothesis.T_M1_M2;
+      choose();
     }
     return best && (most >= kAgree || agreeing_tags(ties, *best) >= kAgreeingTags) ? best : std::nullopt;
   }
