@@ -25,7 +25,8 @@ def bench(folder, *arguments):
 
 
 def finished(folder):
-    return {path.parent.name: path.stat().st_mtime_ns for path in (folder / "out" / "cells").glob("*/cell.json")}
+    """A cell is finished when its folder has its own name: in the moment before, it is ID.part."""
+    return {path.parent.name: path.stat().st_mtime_ns for path in (folder / "out" / "cells").glob("*/cell.json") if path.parent.suffix != ".part"}
 
 
 def kill_after_first_cell(folder):

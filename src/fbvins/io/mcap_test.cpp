@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writer and reader of MCAP against each other, and against files that are cut off or damaged. Third-party readers are
 // tried in tests/flight_record_by_others.py.
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -10,6 +11,8 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <utility>
 
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/mcap_reader.hpp"
@@ -18,6 +21,28 @@
 
 namespace fbvins {
 namespace mcap_test {
+
+/// While it lives, something looks at the file in the middle of each long pwrite() of this process and behind each one.
+class WatchedWrites {
+ public:
+  explicit WatchedWrites(std::function<void()> look) { look_ = std::move(look); }
+  ~WatchedWrites() { look_ = nullptr; }
+  WatchedWrites(const WatchedWrites&) = delete;
+  WatchedWrites& operator=(const WatchedWrites&) = delete;
+
+  static ssize_t write(int fd, const void* bytes, std::size_t size, off_t offset) {
+    using Write = ssize_t (*)(int, const void*, std::size_t, off_t);
+    static const auto really = reinterpret_cast<Write>(::dlsym(RTLD_NEXT, "pwrite"));
+    if (look_ && size > kLong_bytes) size /= 2;  // the caller goes on with the rest
+    const ssize_t done = really(fd, bytes, size, offset);
+    if (look_) look_();
+    return done;
+  }
+
+ private:
+  static constexpr std::size_t kLong_bytes = 60;
+  static inline std::function<void()> look_;
+};
 
 namespace fs = std::filesystem;
 
@@ -133,6 +158,36 @@ TEST_F(Mcap, AFileWhoseWriterWasKilledHasAnEnd) {
   McapReader whole = reader_of(bytes());
   (void)read_all(whole);
   EXPECT_FALSE(whole.damage().no_summary);
+}
+
+/// Whatever write the process dies in, large ones also half done: the file has an end, and all earlier chunks.
+TEST_F(Mcap, AFileHasAnEndBetweenAnyTwoWrites) {
+  McapWriter file = create();
+  std::vector<Said> said, written;
+  std::size_t longest = 0;
+  int looks = 0;
+  const auto look = [&] {
+    ++looks;
+    const std::string now = bytes();
+    ASSERT_TRUE(now.ends_with(kMcapMagic)) << "look " << looks;
+    McapReader reader = reader_of(now);
+    const std::vector<Said> read = read_all(reader);
+    ASSERT_TRUE(read == written || read == said) << "look " << looks << ": " << read.size();
+    ASSERT_FALSE(reader.damage().ends_early);
+    ASSERT_EQ(reader.damage().parts, 0) << reader.damage().first;
+    longest = std::max(longest, now.size());
+  };
+  for (int chunk = 0; chunk < 3; ++chunk) {
+    for (int i = 0; i < 10; ++i) said.push_back(say(file, 10 * chunk + i));
+    const WatchedWrites watched(look);
+    ASSERT_TRUE(file.flush());
+    written = said;
+  }
+  const WatchedWrites watched(look);
+  ASSERT_TRUE(file.finish());
+  look();
+  EXPECT_GE(looks, 4 * 4) << "writes were not seen";
+  EXPECT_EQ(longest, bytes().size());
 }
 
 TEST_F(Mcap, RecoveredFilesAreWhole) {
@@ -257,6 +312,7 @@ TEST_F(Mcap, AFullDiskCostsOnlyWhatDidNotFit) {
   std::signal(SIGXFSZ, old);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message, path_ + ": writing failed (File too large)");
+  EXPECT_TRUE(bytes().ends_with(kMcapMagic));
   said.push_back(say(file, 3));
   ASSERT_TRUE(file.finish());
   McapReader reader = reader_of(bytes());
@@ -266,3 +322,7 @@ TEST_F(Mcap, AFullDiskCostsOnlyWhatDidNotFit) {
 
 }  // namespace mcap_test
 }  // namespace fbvins
+
+extern "C" ssize_t pwrite(int fd, const void* bytes, size_t size, off_t offset) {
+  return fbvins::mcap_test::WatchedWrites::write(fd, bytes, size, offset);
+}

@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "fbvins/io/mcap_format.hpp"
 
@@ -45,6 +46,9 @@ void append_channel(std::string& out, std::uint16_t id, std::uint16_t schema, co
   append_mcap_text(out, metadata);
   end_mcap_record(out, start);
 }
+
+/// A footer and the magic, which end a file.
+constexpr std::size_t kFooter_bytes = kMcapRecordHead_bytes + 8 + 8 + 4 + kMcapMagic.size();
 
 /// An end of the data, and a footer that names no summary.
 std::string provisional_end_of_file() {
@@ -87,21 +91,40 @@ McapWriter::McapWriter(std::string path, FileDescriptor file, const std::vector<
   clear_chunk();
 }
 
-/// A part that did not fit is removed, so that the file stays readable.
-Result<void> McapWriter::write_all(const std::string& bytes, bool provisional_end) {
-  const std::string all = provisional_end ? bytes + provisional_end_of_file() : bytes;
-  for (std::size_t done = 0; done < all.size();) {
-    const ssize_t now = ::pwrite(file_.number(), all.data() + done, all.size() - done, static_cast<off_t>(end_ + done));
+Result<void> McapWriter::write_at(std::uint64_t offset, std::string_view bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t now = ::pwrite(file_.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (now < 0 && errno == EINTR) continue;
-    if (now <= 0) {
-      const int problem = now < 0 ? errno : ENOSPC;
-      [[maybe_unused]] const int cut = ::ftruncate(file_.number(), static_cast<off_t>(end_));
-      return Error{ErrorCode::unwritable, fmt::format("{}: writing failed ({})", path_, std::strerror(problem))};
-    }
-    done += static_cast<std::size_t>(now);
+    if (now <= 0)
+      return Error{ErrorCode::unwritable, fmt::format("{}: writing failed ({})", path_, std::strerror(now < 0 ? errno : ENOSPC))};
+    bytes.remove_prefix(static_cast<std::size_t>(now));
+    offset += static_cast<std::uint64_t>(now);
   }
+  return {};
+}
+
+/// A large write that is interrupted by the end of the process is done in part. So the new end comes first, and the bytes over
+/// the old end come last: before them the file ends, for who reads it from its start, where it did. Only what is small
+/// overwrites.
+Result<void> McapWriter::write_all(const std::string& bytes, bool provisional_end) {
+  const std::string end = provisional_end_of_file(), all = provisional_end ? bytes + end : bytes;
+  const std::size_t footer = all.size() - kFooter_bytes, first = std::min(end.size(), footer);
+  const std::string_view whole(all);
+  const std::pair<std::size_t, std::string_view> parts[] = {{footer, std::string_view(end).substr(end.size() - kFooter_bytes)},
+                                                            {first, whole.substr(first, footer - first)},
+                                                            {0, whole.substr(0, first)},
+                                                            {footer, whole.substr(footer)}};
+  for (const auto& [at, part] : parts)
+    if (Result<void> written = write_at(end_ + at, part); !written) return take_back(), written;
   end_ += bytes.size();
   return {};
+}
+
+/// A part that did not fit is removed, so that the file stays readable.
+void McapWriter::take_back() const {
+  const std::string end = end_ > 0 ? provisional_end_of_file() : "";
+  [[maybe_unused]] const int cut = ::ftruncate(file_.number(), static_cast<off_t>(end_ + end.size()));
+  [[maybe_unused]] const Result<void> restored = write_at(end_, end);
 }
 
 /// A record outside of chunks comes after what is waiting.

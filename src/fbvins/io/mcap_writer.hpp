@@ -4,18 +4,20 @@
 //   auto file = McapWriter::create("flight.mcap", {"ros2", "fbvins"}, {{"/imu", "sensor_msgs/msg/Imu", definition}});
 //   append_imu(file->begin_message(0, t), sample);
 //   file->end_message();
-//   file->flush();                              // a chunk: one write(2)
+//   file->flush();                              // a chunk
 //   file->finish();                             // index, statistics, footer
 //
 // What begin_message() takes is in memory until flush(): how long is the choice of the caller, who has a clock.
-// A file without finish() is whole up to its last chunk, and has an end: behind each chunk lies an empty one, over which the next
-// chunk is written. It only lacks the index by which programs seek, and those that insist on an end read it, too.
+// A file without finish() is whole up to its last chunk, and has an end, whatever write the process died in: behind each chunk
+// lies a provisional end, over which the next chunk is written, its first bytes last. It only lacks the index by which programs
+// seek, and those that insist on an end read it, too.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fbvins/core/file_descriptor.hpp"
@@ -73,6 +75,8 @@ class McapWriter {
   McapWriter(std::string path, FileDescriptor file, const std::vector<McapTopic>& topics);
   /// `provisional_end`: with an end behind it that is not counted, so that it is overwritten.
   Result<void> write_all(const std::string& bytes, bool provisional_end = true);
+  Result<void> write_at(std::uint64_t offset, std::string_view bytes) const;
+  void take_back() const;
   Result<void> write_record(const std::string& record);
   void close_chunk();
   void clear_chunk();
