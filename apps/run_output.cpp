@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -119,8 +120,16 @@ struct RunWriter::State {
   TumWriter tum;
   OdometryCsvWriter csv;
   OutputFile covariance, gauge, statistics, timing;
-  std::mutex mutex;
+  std::mutex mutex;                            ///< guards the next one
   std::deque<TrackedRecord> without_odometry;  ///< frames whose odometry has not come yet
+
+  std::vector<TrackedRecord> take_until(FrameId last) {
+    const std::lock_guard lock(mutex);
+    const auto end = std::ranges::find_if(without_odometry, [&](const TrackedRecord& tracked) { return last < tracked.id; });
+    std::vector<TrackedRecord> taken(without_odometry.begin(), end);
+    without_odometry.erase(without_odometry.begin(), end);
+    return taken;
+  }
 
   void write(const TrackedRecord& tracked, const EstimatorStats& stats) {
     statistics.write(statistics_row(tracked, stats));
@@ -165,24 +174,21 @@ void RunWriter::add(const TrackedRecord& tracked) {
   state_->without_odometry.push_back(tracked);
 }
 
-/// A frame that the estimator skipped gets a row with zeros in the estimator's columns.
+/// A frame that the estimator skipped gets a row with zeros in the estimator's columns. The disk is waited for without the mutex,
+/// which the frontend's thread takes, too.
 void RunWriter::add(const Odometry& o) {
-  const std::lock_guard lock(state_->mutex);
   if (o.health.has_pose()) {
     state_->tum.write(o.t, o.T_WB);
     state_->gauge.write(gauge_row(o));
   }
   state_->csv.write(o);
   state_->covariance.write(covariance_row(o));
-  auto& waiting = state_->without_odometry;
-  for (; !waiting.empty() && waiting.front().id <= o.id; waiting.pop_front())
-    state_->write(waiting.front(), waiting.front().id == o.id ? o.stats : EstimatorStats{});
+  for (const TrackedRecord& tracked : state_->take_until(o.id))
+    state_->write(tracked, tracked.id == o.id ? o.stats : EstimatorStats{});
 }
 
 Result<void> RunWriter::close() {
-  const std::lock_guard lock(state_->mutex);
-  for (const TrackedRecord& tracked : state_->without_odometry) state_->write(tracked, {});
-  state_->without_odometry.clear();
+  for (const TrackedRecord& tracked : state_->take_until({std::numeric_limits<std::int64_t>::max()})) state_->write(tracked, {});
   Result<void> first;
   for (Result<void> done : {state_->tum.close(), state_->csv.close(), state_->covariance.close(), state_->gauge.close(),
                             state_->statistics.close(), state_->timing.close()})

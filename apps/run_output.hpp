@@ -34,7 +34,8 @@ struct RunRecord {
 };
 
 /// The trajectory, statistics and timing files, written as the frames come; the folder must exist. covariance.csv has the
-/// covariances that trajectory.csv leaves out: of velocity and biases. Any thread; frames come before their odometry.
+/// covariances that trajectory.csv leaves out: of velocity and biases. Frames come before their odometry, on any thread, which
+/// never waits for the disk; odometry and close() on one.
 class RunWriter {
  public:
   static Result<RunWriter> create(const std::string& folder);

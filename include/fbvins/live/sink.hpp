@@ -32,9 +32,10 @@ class Sink {
   /// Asked with every image, on the estimator's thread: whether it wants a LiveView of it. Each costs that thread some ten
   /// microseconds.
   virtual bool wants_views() const { return false; }
-  /// A problem that may pass, such as an unplugged cable, in one sentence for the status. Empty: none. From any thread.
+  /// A problem that may pass, such as an unplugged cable, in one sentence for the status. Empty: none. From any thread, the
+  /// estimator's among them, and without waiting for a disk or a network, whatever take() is doing.
   virtual std::string problem() const { return {}; }
-  /// For displays, asked once a second. From any thread, and without waiting for a disk or a network.
+  /// For displays, asked once a second and when health changes. As problem().
   virtual std::vector<OutputFigure> figures() const { return {}; }
   /// The last call: close what is open.
   virtual Result<void> finish() { return {}; }

@@ -5,29 +5,43 @@
 
 namespace fbvins {
 
-Result<std::string> RecordSwitch::start() {
+std::shared_ptr<RecordSink> RecordSwitch::record() const {
   const std::lock_guard lock(mutex_);
-  if (record_) return Error{ErrorCode::invalid_argument, "a record is being written: " + record_->path()};
-  auto opened = open_();
-  problem_ = opened ? "" : opened.error().message;
-  if (!opened) return opened.error();
-  record_ = std::move(*opened);
-  on_ = true;
-  return record_->path();
+  return record_;
 }
 
-Result<std::string> RecordSwitch::stop() {
+std::shared_ptr<RecordSink> RecordSwitch::exchange(std::shared_ptr<RecordSink> record, std::string problem) {
   const std::lock_guard lock(mutex_);
-  if (!record_) return Error{ErrorCode::invalid_argument, "no record is being written"};
-  on_ = false;
-  const std::unique_ptr<RecordSink> ended = std::exchange(record_, nullptr);
+  problem_ = std::move(problem);
+  on_ = record != nullptr;
+  return std::exchange(record_, std::move(record));
+}
+
+Result<std::string> RecordSwitch::start() {
+  const std::lock_guard lock(changing_);
+  if (const auto current = record()) return Error{ErrorCode::invalid_argument, "a record is being written: " + current->path()};
+  auto opened = open_();
+  if (!opened) {
+    exchange(nullptr, opened.error().message);
+    return opened.error();
+  }
+  std::string path = (*opened)->path();
+  exchange(std::move(*opened), "");
+  return path;
+}
+
+/// What take() hands to the record while it ends comes too late for it.
+Result<std::string> RecordSwitch::stop() {
+  const std::lock_guard lock(changing_);
+  const std::shared_ptr<RecordSink> ended = exchange(nullptr, problem());
+  if (!ended) return Error{ErrorCode::invalid_argument, "no record is being written"};
   if (Result<void> done = ended->finish(); !done) return done.error();
   return ended->path();
 }
 
 Result<void> RecordSwitch::take(const LiveEvent& event) {
-  const std::lock_guard lock(mutex_);
-  return record_ ? record_->take(event) : Result<void>{};
+  const auto current = record();
+  return current ? current->take(event) : Result<void>{};
 }
 
 std::string RecordSwitch::problem() const {
@@ -36,17 +50,18 @@ std::string RecordSwitch::problem() const {
 }
 
 std::vector<OutputFigure> RecordSwitch::figures() const {
-  const std::lock_guard lock(mutex_);
-  std::vector<OutputFigure> figures{{"recording", record_ != nullptr}};
-  if (record_)
-    for (OutputFigure& figure : record_->figures()) figures.push_back(std::move(figure));
+  const auto current = record();
+  std::vector<OutputFigure> figures{{"recording", current != nullptr}};
+  if (current)
+    for (OutputFigure& figure : current->figures()) figures.push_back(std::move(figure));
   return figures;
 }
 
 Result<void> RecordSwitch::finish() {
   on_ = false;
-  const std::lock_guard lock(mutex_);
-  return record_ ? record_->finish() : Result<void>{};
+  const std::lock_guard lock(changing_);
+  const auto current = record();
+  return current ? current->finish() : Result<void>{};
 }
 
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 //   live->add_sink(std::move(record));
 //   Result<std::string> ended = ...->stop();
 //
-// Threads: start(), stop(), problem() and figures() from any.
+// Threads: start(), stop(), problem() and figures() from any. The last two never wait for the disk: the estimator's thread asks.
 #pragma once
 
 #include <atomic>
@@ -38,10 +38,14 @@ class RecordSwitch final : public Sink {
   Result<void> finish() override;
 
  private:
+  std::shared_ptr<RecordSink> record() const;
+  std::shared_ptr<RecordSink> exchange(std::shared_ptr<RecordSink> record, std::string problem);
+
   Open open_;
-  mutable std::mutex mutex_;
-  std::unique_ptr<RecordSink> record_;  // guarded by mutex_; null: none is being written
-  std::string problem_;                 // guarded by mutex_
+  std::mutex changing_;                 // held by start() and stop(), which wait for the disk
+  mutable std::mutex mutex_;            // guards the next two, and is held while they are copied
+  std::shared_ptr<RecordSink> record_;  // null: none is being written
+  std::string problem_;
   std::atomic<bool> on_{false};
 };
 

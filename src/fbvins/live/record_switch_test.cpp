@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
+#include <future>
 
 #include "fbvins/io/dataset.hpp"
 
@@ -81,6 +84,32 @@ TEST_F(RecordSwitchTest, AFolderThatIsNotThereIsAProblemUntilItIs) {
   fs::create_directories(folder + "/unplugged");
   EXPECT_TRUE(record.start());
   EXPECT_EQ(record.problem(), "");
+}
+
+/// The estimator's thread asks for them.
+TEST_F(RecordSwitchTest, FiguresDoNotWaitForASlowDisk) {
+  std::atomic<bool> slow = false;
+  std::promise<void> asked, disk;
+  const std::shared_future<void> answer = disk.get_future().share();
+  const auto free_bytes = [&](const std::string&) {
+    if (slow.exchange(false)) {
+      asked.set_value();
+      answer.wait();
+    }
+    return std::uint64_t{1} << 40U;
+  };
+  RecordSwitch busy([&] { return RecordSink::create_next(path, rig, {}, {.keep_free_bytes = 0, .free_bytes = free_bytes}); });
+  ASSERT_TRUE(busy.start());
+  slow = true;  // from the next flush on, which has the record to itself
+  asked.get_future().wait();
+  auto taken = std::async(std::launch::async, [&] { return static_cast<bool>(busy.take(ImuSample{t})); });
+  EXPECT_EQ(taken.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  auto figures = std::async(std::launch::async, [&] { return busy.problem().size() + busy.figures().size(); });
+  EXPECT_EQ(figures.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  disk.set_value();
+  EXPECT_TRUE(taken.get());
+  EXPECT_EQ(figures.get(), 4u);
+  EXPECT_TRUE(busy.finish());
 }
 
 }  // namespace record_switch_test
