@@ -10,10 +10,8 @@
 #include "fbvins/live/hub.hpp"
 #include "fbvins/live/ingest.hpp"
 #include "fbvins/live/latency_histogram.hpp"
-#include "fbvins/live/pose_propagator.hpp"
-#include "fbvins/live/sensor_watch.hpp"
+#include "fbvins/live/live_estimate.hpp"
 #include "fbvins/live/view_maker.hpp"
-#include "fbvins/types/protection.hpp"
 
 namespace fbvins {
 namespace {
@@ -24,7 +22,7 @@ constexpr Duration kStatusPeriod = Duration::from_seconds(1);
 }  // namespace
 
 // sensors' threads -> Ingest -[one waiting image, all readings]-> feeder -> System -> Odometry
-//                       '-[each reading, at once]-> PosePropagator -> LivePose        '-> rebase
+//                       '-[each reading, at once]-> LiveEstimate -> LivePose          '-> LiveEstimate
 //                                                                     all of it -> Hub -> sinks
 // While the IMU is silent the estimates of the images are the LivePoses.
 struct LiveSystem::Impl {
@@ -35,11 +33,10 @@ struct LiveSystem::Impl {
             options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
             Duration::from_seconds(rig.time_offset_s), rig.camera_count()),
         system(std::move(made)),
-        watch(options, system_options.estimator),
-        propagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),
-                   options.smoothing_s, system_options.estimator.gravity_mps2),
-        views(rig),
-        started(host_now()) {
+        estimate(PosePropagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),
+                                options.smoothing_s, system_options.estimator.gravity_mps2),
+                 SensorWatch(options, system_options.estimator), first_reset_counter, host_now()),
+        views(rig) {
     system.on_tracked_frame([this](const TrackedFrame& f) { on_frame(f); });
     system.on_window([this](const WindowSnapshot& window) { views.add(window); }, [this] { return views_wanted; });
     system.on_odometry([this](Odometry o) { on_odometry(std::move(o)); });
@@ -53,18 +50,7 @@ struct LiveSystem::Impl {
   // Readings and estimates.
 
   void on_reading(const ImuSample& sample, Time host_t) {
-    std::optional<LivePose> pose;
-    {
-      const std::lock_guard lock(pose_mutex);
-      pose = propagator.add(sample);
-      if (!pose) return;
-      pose->reset_counter = reset_counter;  // before the first estimate, too
-      if (pose->health.has_pose()) newest_sigma_m = worst_sigma_m(pose->pose_covariance);
-      if (pose->health.has_pose()) pose->health = health;  // else the propagator has no pose, whatever `health` says
-      if (estimate_host_t) pose_age.add(host_t - *estimate_host_t);
-    }
-    pose->host_t = host_t;
-    hub.publish(*std::move(pose));
+    if (std::optional<LivePose> pose = estimate.add(sample, host_t)) hub.publish(*std::move(pose));
   }
 
   void on_frame(const TrackedFrame& frame) {
@@ -78,19 +64,7 @@ struct LiveSystem::Impl {
     const Time image_host_t = ingest.host_of(o.t);
     const Duration latency = host_now() - image_host_t;
     shutter_to_pose.add(latency);
-    std::optional<LivePose> pose;  // of the image, where no readings carry it on
-    {
-      const std::lock_guard lock(pose_mutex);
-      pose = propagator.rebase(o);
-      estimated = o.health;
-      resets += o.reset_counter - reset_counter;
-      reset_counter = o.reset_counter;
-      ++images_estimated;
-      if (o.health.has_pose())
-        estimate_host_t = image_host_t, estimate_sigma_m = newest_sigma_m = worst_sigma_m(o.pose_covariance);
-      if (pose) pose->reset_counter = reset_counter, pose->host_t = image_host_t;
-    }
-    if (pose) hub.publish(*std::move(pose));
+    if (std::optional<LivePose> pose = estimate.add(o, image_host_t)) hub.publish(*std::move(pose));
     if (views_wanted) hub.publish(views.view_of(o, latency.seconds() * 1e3));
     hub.publish(std::move(o));
     look(false);
@@ -134,14 +108,7 @@ struct LiveSystem::Impl {
   /// Updates health; publishes a status if it has changed, or if `due`.
   void look(bool due) {
     const Ingest::Arrival arrivals = ingest.arrivals();
-    bool changed = false;
-    {
-      const std::lock_guard lock(pose_mutex);
-      const Health now =
-          watch.judge({estimated, estimate_host_t, estimate_sigma_m, newest_sigma_m}, arrivals, started, host_now());
-      changed = !(now == health);
-      health = now;
-    }
+    const bool changed = estimate.judge(arrivals, host_now());
     if (changed || due) hub.publish(status());
   }
 
@@ -152,7 +119,7 @@ struct LiveSystem::Impl {
     s.counts = ingest.counts();
     s.counts.keyframes_left_out = system.keyframes_left_out();
     s.shutter_to_pose = shutter_to_pose.summary();
-    s.pose_age = pose_age.summary();
+    estimate.tell(s);
     for (const Hub::SinkReport& report : hub.reports()) {
       s.counts.events_lost += report.dropped;
       const std::string& problem = report.problem.empty() ? report.passing : report.problem;
@@ -160,11 +127,6 @@ struct LiveSystem::Impl {
       if (!report.figures.empty()) s.outputs.push_back({report.name, report.figures});
     }
     if (const Result<void> state = system.status(); !state) s.problem = state.error().message;
-    const std::lock_guard lock(pose_mutex);
-    s.health = health;
-    s.reset_counter = reset_counter;
-    s.counts.images_estimated = images_estimated;
-    s.counts.resets = resets;
     return s;
   }
 
@@ -189,22 +151,14 @@ struct LiveSystem::Impl {
   Hub hub;
   Ingest ingest;
   System system;
-  SensorWatch watch;
-
-  std::mutex pose_mutex;  ///< guards all up to `resets`
-  PosePropagator propagator;
-  Health estimated, health;  ///< the estimator's, and SensorWatch's judgement of it
-  std::optional<Time> estimate_host_t;
-  double estimate_sigma_m = 0, newest_sigma_m = 0;
-  std::uint32_t reset_counter = first_reset;
-  std::int64_t images_estimated = 0, resets = 0;
+  LiveEstimate estimate;
+  LatencyHistogram shutter_to_pose;
 
   ViewMaker views;            ///< used on the estimator's thread alone
   bool views_wanted = false;  ///< with this image; likewise
   std::function<void(const TrackedFrame&)> on_tracked_frame;
   std::function<void()> on_failure;
-  LatencyHistogram shutter_to_pose, pose_age;
-  Time started;
+
   std::thread feeder, watcher;
   std::mutex end_mutex;
   std::condition_variable end;
