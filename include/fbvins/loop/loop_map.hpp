@@ -43,9 +43,9 @@ struct MapOptions {
 
 class LoopMap final : public Mapper {
  public:
-  /// Of a rig of more than two cameras the map has the places that its first pair sees. An error where no two cameras see the
-  /// same things and there is no depth sensor, an option is out of range, or the map, the vocabulary or the network cannot be
-  /// read or do not belong together.
+  /// Of a rig of more than two cameras the map has the places that its first pair sees; of cameras that all see different things,
+  /// those of the first. An error where an option is out of range, or the map, the vocabulary or the network cannot be read or
+  /// do not belong together.
   static Result<std::unique_ptr<LoopMap>> create(const StereoRig& rig, const MapOptions& options = {});
   ~LoopMap() override;
 
@@ -80,11 +80,11 @@ class LoopMap final : public Mapper {
   Result<void> save(const std::string& path) const;
 
  private:
-  LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair);
+  LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> cameras);
 
   std::unique_ptr<LoopCloser> closer_;
   std::unique_ptr<MapJournal> journal_;
-  std::optional<CameraGroup> pair_;  ///< of a rig of more than two cameras
+  std::optional<CameraGroup> cameras_;  ///< whose places it has; none: of the whole rig
 };
 
 }  // namespace fbvins

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/loop_map.hpp"
 
+#include <algorithm>
+
 #include "fbvins/camera/group_images.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/features/booster.hpp"
@@ -14,22 +16,20 @@
 namespace fbvins {
 namespace {
 
-/// The first two that see the same things.
-std::optional<CameraGroup> first_pair(const StereoRig& rig) {
-  for (const CameraGroup& group : camera_groups(rig))
-    if (group.second) return group;
-  return std::nullopt;
+/// Whose places a map has, where they are not the whole rig: the first two that see the same things, or the first camera.
+std::optional<CameraGroup> recognising(const StereoRig& rig) {
+  if (rig.camera_count() == 1) return std::nullopt;
+  const std::vector<CameraGroup> groups = camera_groups(rig);
+  const auto pair = std::ranges::find_if(groups, [](const CameraGroup& group) { return group.second.has_value(); });
+  if (pair == groups.end()) return groups.front();
+  return rig.more.empty() ? std::nullopt : std::optional(*pair);
 }
 
 }  // namespace
 
 Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const MapOptions& options) {
   if (Result<void> valid = validate(options.loop); !valid) return valid.error();
-  const std::optional<CameraGroup> pair = rig.more.empty() ? std::nullopt : first_pair(rig);
-  if ((!rig.has_right() || !rig.more.empty()) && !rig.depth && !pair)
-    return Error{ErrorCode::unsupported,
-                 "a map needs two cameras that see the same things, or a depth sensor: places are recognised "
-                 "by the depth of what they show"};
+  const std::optional<CameraGroup> cameras = recognising(rig);
   Result<PlaceMap> map = PlaceMap{};
   constexpr std::uint64_t kMB = 1'000'000;
   if (!options.file.empty()) map = open_map(options.file, kMB * static_cast<std::uint64_t>(options.loop.memory_mb));
@@ -42,25 +42,25 @@ Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const Map
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (map->boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return stage.error();
-  auto closer = std::make_unique<LoopCloser>(pair ? rig_of(rig, *pair) : rig, options.loop, std::move(*vocabulary),
+  auto closer = std::make_unique<LoopCloser>(cameras ? rig_of(rig, *cameras) : rig, options.loop, std::move(*vocabulary),
                                              std::move(*map), std::move(*stage));
-  return std::unique_ptr<LoopMap>(new LoopMap(std::move(closer), pair));
+  return std::unique_ptr<LoopMap>(new LoopMap(std::move(closer), cameras));
 }
 
-LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair)
-    : closer_(std::move(closer)), journal_(std::make_unique<MapJournal>()), pair_(pair) {}
+LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> cameras)
+    : closer_(std::move(closer)), journal_(std::make_unique<MapJournal>()), cameras_(cameras) {}
 LoopMap::~LoopMap() = default;
 
 MapUpdate LoopMap::process(const Keyframe& keyframe) {
-  if (!pair_) return closer_->process(keyframe);
-  Keyframe of_pair = keyframe;
-  of_pair.images = images_of(keyframe.images, *pair_);
-  return closer_->process(of_pair);
+  if (!cameras_) return closer_->process(keyframe);
+  Keyframe of_cameras = keyframe;
+  of_cameras.images = images_of(keyframe.images, *cameras_);
+  return closer_->process(of_cameras);
 }
 void LoopMap::take_over(std::unique_ptr<LoopMap> other) {
   closer_ = std::move(other->closer_);
   journal_ = std::move(other->journal_);
-  pair_ = other->pair_;
+  cameras_ = other->cameras_;
 }
 PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }

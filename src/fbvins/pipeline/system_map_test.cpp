@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "fbvins/loop/loop_closer.hpp"
@@ -18,10 +20,10 @@ namespace system_map_test {
 
 using namespace sway_recording;
 
-std::unique_ptr<LoopCloser> loop_closer() {
+std::unique_ptr<LoopCloser> loop_closer(const StereoRig& rig = small_rig(), PlaceMap map = {}) {
   auto vocabulary = Vocabulary::open(shipped_vocabulary());
   EXPECT_TRUE(vocabulary.ok()) << vocabulary.error().message;
-  return std::make_unique<LoopCloser>(small_rig(), LoopOptions{}, std::move(*vocabulary));
+  return std::make_unique<LoopCloser>(rig, LoopOptions{}, std::move(*vocabulary), std::move(map));
 }
 
 struct MapOutcome {
@@ -113,6 +115,57 @@ TEST(LoopClosureInTheSystem, AnchorsMakeMTheBuildingsFrame) {
     EXPECT_LT((k.T_MB.p - truth.p).norm(), 0.01) << k.t.seconds();
     EXPECT_LT(so3_log(k.T_MB.q.conjugate() * truth.q).norm(), 0.01) << k.t.seconds();
   }
+}
+
+/// A flight of one camera or of two. The map, and where the body was in M at each keyframe from which on it was known.
+struct Flown {
+  std::string map;
+  std::vector<std::pair<Time, Pose<M, B>>> in_M;
+  int loops = 0;
+};
+
+Flown fly_in(PlaceMap map, int cameras) {
+  const StereoRig rig = cameras == 1 ? with_one_camera(small_rig()) : small_rig();
+  const std::unique_ptr<LoopCloser> loop = loop_closer(rig, std::move(map));
+  System system = *System::create({}, rig, RunMode::deterministic, {.mapper = loop.get()});
+  Flown flown;
+  std::map<std::int64_t, std::pair<Time, Pose<G, B>>> keyframes;
+  system.on_keyframe([&](const Keyframe& k) { keyframes[k.id.value] = {k.t, k.gauge.T_GB}; });
+  system.on_map_update([&](const MapUpdate& u) {
+    flown.loops += static_cast<int>(u.loops.size());
+    const auto& [t, T_GB] = keyframes[u.frame.value];
+    if (u.localised) flown.in_M.push_back({t, u.T_MG * T_GB});
+  });
+  for (SensorEvent event : sway(150)) {
+    if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && cameras == 1) frame->right.reset();
+    EXPECT_TRUE(system.push(std::move(event)));
+  }
+  EXPECT_TRUE(system.finish().ok());
+  loop->finish();
+  flown.map = serialise_map(loop->map());
+  return flown;
+}
+
+/// Whoever made it: one camera has a place's depths from where it was before, two cameras have them at once.
+TEST(MapOfOneCamera, ClosesLoopsAndIsSharedWithAPair) {
+  Flown first[3];
+  for (const int cameras : {1, 2}) {
+    first[cameras] = fly_in({}, cameras);
+    EXPECT_GT(first[cameras].loops, 0) << cameras;
+  }
+  for (const int mapped : {1, 2})
+    for (const int flies : {1, 2}) {
+      if (mapped == 2 && flies == 2) continue;
+      auto map = parse_map(std::as_bytes(std::span(first[mapped].map)), "map");
+      ASSERT_TRUE(map.ok());
+      const MapKeyframe& k = map->keyframes()[map->size() / 2];
+      const Vec3 along = k.T_MB.q * Vec3::UnitX(), at = k.T_MB.p - sway_m(k.t.seconds()) * along;
+      const Flown again = fly_in(std::move(*map), flies);
+      ASSERT_GT(again.in_M.size(), 5u) << flies << " in a map of " << mapped;
+      for (const auto& [t, T_MB] : again.in_M)
+        EXPECT_LT((T_MB.p - at - sway_m(t.seconds()) * along).norm(), 0.05)
+            << flies << " in a map of " << mapped << ", " << t.seconds() << " s";
+    }
 }
 
 /// With the IMU's clock beside the cameras', and the offset known, everything is the same to the last bit: the odometry with
