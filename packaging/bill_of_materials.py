@@ -5,9 +5,11 @@
   packaging/bill_of_materials.py PACKAGE.deb... > sbom.spdx.json
 
 Of each package: its checksum, the libraries that it loads (its dependencies, with the least version), and the libraries whose
-code is inside, as packaging/copyright has them, with the versions of this machine and of web/package-lock.json.
+code is inside, as packaging/copyright has them, with the versions of this machine, of the libraries fetched for arm64, and of
+web/package-lock.json.
 """
 import datetime
+import gzip
 import hashlib
 import json
 import os
@@ -18,6 +20,7 @@ import sys
 import uuid
 
 REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
+ARM64 = REPOSITORY / "build-sysroot/arm64"  # packaging/arm64_sysroot: only extracted, so that dpkg does not know its packages
 # Whose code is compiled in: name as in packaging/copyright's Comment, the package or module that has it.
 DEBIAN = {"Eigen": "libeigen3-dev", "fmt": "libfmt-dev", "JSON for Modern C++": "nlohmann-json3-dev", "yaml-cpp": "libyaml-cpp-dev", "CLI11": "libcli11-dev",
           "Ceres Solver": "libceres-dev", "Boost.Beast": "libboost-dev", "SIMDe": "libsimde-dev"}
@@ -32,7 +35,13 @@ def control(package, field):
 
 def debian_version(package):
     found = subprocess.run(["dpkg-query", "-W", "-f=${Version}", package], capture_output=True, text=True, check=False)
-    return found.stdout.strip() or "NOASSERTION"
+    if found.stdout.strip():
+        return found.stdout.strip()
+    changelog = ARM64 / "usr/share/doc" / package / "changelog.Debian.gz"
+    if not changelog.exists():
+        return "NOASSERTION"
+    with gzip.open(changelog, "rt", encoding="utf-8") as text:
+        return re.match(r"\S+ \((\S+)\)", text.readline())[1]
 
 
 def inside():

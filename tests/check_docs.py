@@ -84,7 +84,7 @@ def versions(root):
     """All files name the same version."""
     named = {file: re.search(pattern, (root / file).read_text(encoding="utf-8"), re.M).group(1)
              for file, pattern in {"CMakeLists.txt": r"^project\(fbvins VERSION ([0-9.]+)", "pyproject.toml": r'^version = "(.*)"',
-                                   "CITATION.cff": r"^version: (.*)$"}.items()}
+                                   "CITATION.cff": r"^version: (.*)$", "ros2/package.xml": r"<version>(.*)</version>"}.items()}
     if len(set(named.values())) != 1:
         yield f"versions differ: {named}"
 

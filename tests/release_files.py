@@ -128,7 +128,7 @@ def check_site_versions(folder):
 
 
 def check_release(folder):
-    """A release that could not be signed is refused at once, not after an hour of building."""
+    """A release without its tag, without its key or of two versions is refused at once, not after an hour of building."""
     if not (REPOSITORY / ".git").exists():
         return print("./dev release: not tried, as this is no clone")
     clone = folder / "clone"
@@ -139,6 +139,11 @@ def check_release(folder):
     run("git", "tag", tag, cwd=clone)
     done = run("./dev", "release", ok=False, **more)
     require(done.returncode == 2 and "no secret key nobody@localhost" in done.stderr, f"a release by a key that is not there: {done.stderr}")
+    manifest = clone / "ros2/package.xml"
+    manifest.write_text(re.sub("<version>.*</version>", "<version>9.8.7</version>", manifest.read_text(encoding="utf-8")), encoding="utf-8")
+    run("git", "-c", "user.name=test", "-c", "user.email=test@localhost", "commit", "--quiet", "--all", "--message=another version", cwd=clone)
+    run("git", "tag", "--force", tag, cwd=clone)
+    require("versions differ" in run("./dev", "release", ok=False, **more).stderr, "a release with a version of its own in one file")
     require(not (clone / "out").exists(), "something was made")
     return None
 
