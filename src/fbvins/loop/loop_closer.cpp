@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "fbvins/core/stage_timer.hpp"
-#include "fbvins/imu/preintegration.hpp"
 #include "fbvins/loop/final_adjustment.hpp"
 #include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_sessions.hpp"
@@ -118,11 +117,8 @@ void LoopCloser::advance(const Keyframe& keyframe) {
   motion_.add(keyframe);
   drift_.take(keyframe.pose_covariance, keyframe.gauge, session_.path_m);
   frame_.advance(T_GB, keyframe.t, drift_.rate());
-  const std::vector<ImuSegment>& read = keyframe.imu.segments;
   const MapKeyframe* newest = map_.find(session_.newest);
-  if (newest == nullptr || read.empty() || (keyframe.t - newest->t).seconds() > kLongestImu_s) session_.readings_missing = true;
-  if (session_.readings_missing) session_.readings.clear();
-  else session_.readings.insert(session_.readings.end(), read.begin(), read.end());
+  session_.readings.add(keyframe.imu.segments, keyframe.t, newest ? std::optional(newest->t) : std::nullopt);
 }
 
 MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
@@ -265,21 +261,13 @@ void LoopCloser::join_session(const Pose<M, G>& T_MG) {
 }
 
 /// From the newest keyframe of the map to `t`; null where readings are missing on the way, or keyframes in between.
-std::shared_ptr<const Preintegration> LoopCloser::readings_since_newest(Time t, const KeyframeImu& imu) const {
-  if (session_.readings_missing) return nullptr;
-  Preintegration between(imu.noise, imu.bias);
-  for (const ImuSegment& segment : session_.readings) between.integrate(segment);
-  if (between.begin() != map_.find(session_.newest)->t || between.end() != t) return nullptr;
-  return std::make_shared<const Preintegration>(std::move(between));
-}
-
 void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update) {
   std::optional<MapEdge> odometry;
-  if (const MapKeyframe* previous = map_.find(session_.newest); previous != nullptr)
+  if (const MapKeyframe* previous = map_.find(session_.newest); previous != nullptr) {
     odometry = odometry_edge(*previous, query.T_GB, query.t, drift_.rate());
-  if (odometry) odometry->imu = readings_since_newest(query.t, imu);
-  session_.readings.clear();
-  session_.readings_missing = false;
+    if (odometry) odometry->imu = session_.readings.until(query.t, previous->t, imu);
+  }
+  session_.readings.restart();
   const std::size_t size_before = map_.size();
   const Time t = query.t;
   const BowVector words = query.place.words;

@@ -27,6 +27,7 @@
 #include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_map.hpp"
 #include "fbvins/loop/place_verifier.hpp"
+#include "fbvins/loop/readings_since.hpp"
 #include "fbvins/loop/recent_motion.hpp"
 #include "fbvins/loop/relocaliser.hpp"
 #include "fbvins/loop/thinning.hpp"
@@ -77,8 +78,7 @@ class LoopCloser final : public Mapper {
     KeyframeId newest = {};
     std::optional<Pose<G, B>> T_GB = {};  ///< of the last keyframe that was handed in
     double path_m = 0;
-    std::vector<ImuSegment> readings = {};  ///< since the newest keyframe of the map
-    bool readings_missing = false;
+    ReadingsSince readings = {};  ///< the newest keyframe of the map
   };
   struct Proposal {
     KeyframeId candidate;
@@ -102,7 +102,6 @@ class LoopCloser final : public Mapper {
   void found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
   void join_session(const Pose<M, G>& T_MG);
-  std::shared_ptr<const Preintegration> readings_since_newest(Time t, const KeyframeImu& imu) const;
   void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
   void take_anchors(const Keyframe& keyframe, MapUpdate& update);
   void take_tags(const Keyframe& keyframe, MapUpdate& update);
