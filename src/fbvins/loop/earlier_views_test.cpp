@@ -134,6 +134,25 @@ TEST(EarlierViews, AreOfOneFlightBetweenRestartsAndOfTheLastSeconds) {
   EXPECT_FALSE(found(0, 30)) << "the odometry has drifted since then";
 }
 
+/// Landmarks, which many images have measured, say how long a step of the odometry was.
+TEST(EarlierViews, AreAsFarAwayAsTheLandmarksSay) {
+  const Pose<G, B> before = pose(0, 0, 0), now = pose(0, 0.2, 0);
+  const auto found = [&](double step_m) {
+    PlaceExtractor one = extractor();
+    (void)one.extract(keyframe(0, before));
+    Keyframe k = keyframe(1, now);
+    k.gauge.T_GB.p.y() = step_m;
+    return one.extract(k);
+  };
+  for (const double step_m : {0.18, 0.22}) {
+    const Depths depths = depths_of(found(step_m), now);
+    EXPECT_GT(depths.known, 100) << step_m;
+    EXPECT_GT(depths.right, 0.98 * depths.known) << step_m;
+    EXPECT_LT(depths.chi2, 0.5) << step_m << ": 10 % are three standard deviations";
+  }
+  EXPECT_TRUE(none_has_depth(found(0.3))) << "it is too wrong for the images to be compared";
+}
+
 TEST(EarlierViews, AreKeptInAHover) {
   PlaceExtractor one = extractor();
   (void)one.extract(keyframe(0, pose(0, 0, 0)));

@@ -2,7 +2,9 @@
 #include "fbvins/loop/place_extractor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/imu/exposure_motion.hpp"
 
 namespace fbvins {
@@ -11,6 +13,10 @@ namespace {
 constexpr int kLevels = 6;  // of the scale pyramid
 /// Standard deviation of a keypoint, times the scale of its level.
 constexpr double kKeypoint_px = 0.7;
+/// Landmarks whose depth an earlier view measures this well, relatively, are compared with it, so many at least; and how far they
+/// may be off.
+constexpr double kSureDepth = 0.1, kMostNearer = 0.2;
+constexpr std::size_t kFewestCompared = 8;
 
 Mat3 level_attitude(const Keyframe& keyframe) { return (keyframe.gauge.q_LG * keyframe.gauge.T_GB.q).toRotationMatrix(); }
 
@@ -51,34 +57,58 @@ Place PlaceExtractor::extract(const Keyframe& keyframe) {
   const Pose<G, C0> T_GC = keyframe.gauge.T_GB * left.value_or(Pose<B, B>{}) * rig_.T_BC0;
   const StereoFrame& images = keyframe.images;
   const bool left_alone = images.left && left && !images.right && !has_depth_image(images);
-  const std::optional<EarlierView> earlier = left_alone ? earlier_.best_for(keyframe, T_GC) : std::nullopt;
-  std::optional<SecondImage> second;
-  if (earlier) second = {earlier->image.get(), earlier->from};
-  else if (const auto T_C1C0 = between_exposures(rig_, keyframe)) second = right_of(images, *T_C1C0);
+  bool second = false;
+  if (left_alone) second = look_back(keyframe, T_GC);
+  else if (const auto T_C1C0 = between_exposures(rig_, keyframe)) second = look_right(images, *T_C1C0);
   Place place = extract(images, level_attitude(keyframe), second);
   if (left) earlier_.add(keyframe, T_GC);
   return place;
 }
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
-  return extract(images, R_LB, right_of(images, rig_.T_C1C0()));
+  return extract(images, R_LB, look_right(images, rig_.T_C1C0()));
 }
 
 bool PlaceExtractor::has_depth_image(const StereoFrame& images) const { return depth_ && depth_->is_usable(images.depth.get()); }
 
-std::optional<PlaceExtractor::SecondImage> PlaceExtractor::right_of(const StereoFrame& images, const Pose<C1, C0>& T_C1C0) const {
-  if (!images.right) return std::nullopt;
-  return SecondImage{images.right.get(), {&rig_.right, T_C1C0.R(), T_C1C0.p}};
+bool PlaceExtractor::look_right(const StereoFrame& images, const Pose<C1, C0>& T_C1C0) {
+  if (!images.left || !images.right) return false;
+  depths_.set(images.left->view(), images.right->view(), {&rig_.right, T_C1C0.R(), T_C1C0.p});
+  return true;
 }
 
-Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB, const std::optional<SecondImage>& second) {
+bool PlaceExtractor::look_back(const Keyframe& keyframe, const Pose<G, C0>& T_GC) {
+  const std::optional<EarlierView> earlier = earlier_.best_for(keyframe, T_GC);
+  if (!earlier) return false;
+  depths_.set(keyframe.images.left->view(), earlier->image->view(), earlier->from);
+  const std::optional<double> nearer = nearer_than(keyframe.landmarks);
+  if (!nearer || std::abs(*nearer - 1) > kMostNearer) return false;
+  depths_.stretch(*nearer);
+  return true;
+}
+
+/// By what factor the second view shows landmarks nearer than they are, in the median (L32): many images have measured them.
+std::optional<double> PlaceExtractor::nearer_than(const std::vector<KeyframeLandmark>& landmarks) {
+  const Pose<C0, B> T_CB = rig_.T_BC0.inverse();
+  std::vector<double> factors;
+  for (const KeyframeLandmark& landmark : landmarks) {
+    const double z = (T_CB * landmark.p_B).z();
+    const auto xy = rig_.left.undistort(landmark.pixel);
+    if (!xy || !(z > 0)) continue;
+    const auto depth = depths_.at(landmark.pixel, *xy);
+    if (depth && depth->sigma < kSureDepth * depth->value) factors.push_back(depth->value * z);
+  }
+  if (factors.size() < kFewestCompared) return std::nullopt;
+  return median(factors);
+}
+
+Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB, bool second) {
   Place place;
   place.focal_px = rig_.left.focal_px();
   place.up_C0 = (R_LB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
   if (!images.left) return place;
   orb_.extract(images.left->view(), found_, rig_.left.mask().get());
   stage_->improve(images.left->width(), images.left->height(), found_);
-  if (second) depths_.set(images.left->view(), second->image->view(), second->view);
   const bool by_depth_image = has_depth_image(images);
   const auto depth_of = [&](const Vec2& px, const Vec2& normalised) -> std::optional<MeasuredInverseDepth> {
     if (by_depth_image) return depth_->at(*images.depth, px);

@@ -9,6 +9,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/features/descriptor_stage.hpp"
@@ -36,12 +37,11 @@ class PlaceExtractor {
   Place extract(const StereoFrame& images, const Mat3& R_LB);
 
  private:
-  struct SecondImage {
-    const Image* image;
-    SecondView view;
-  };
-  Place extract(const StereoFrame& images, const Mat3& R_LB, const std::optional<SecondImage>& second);
-  std::optional<SecondImage> right_of(const StereoFrame& images, const Pose<C1, C0>& T_C1C0) const;
+  /// `second`: there is another view, of `depths_`.
+  Place extract(const StereoFrame& images, const Mat3& R_LB, bool second);
+  bool look_right(const StereoFrame& images, const Pose<C1, C0>& T_C1C0);
+  bool look_back(const Keyframe& keyframe, const Pose<G, C0>& T_GC);
+  std::optional<double> nearer_than(const std::vector<KeyframeLandmark>& landmarks);
   bool has_depth_image(const StereoFrame& images) const;
 
   StereoRig rig_;

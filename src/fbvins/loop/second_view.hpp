@@ -34,6 +34,8 @@ class SecondViewDepths {
   explicit SecondViewDepths(double focal_px) : focal_px_(focal_px) {}
 
   void set(const ImageView& left, const ImageView& second, const SecondView& view);
+  /// All points that it shows are farther away by this factor.
+  void stretch(double factor) { view_.p *= factor, view_.sigma_m *= factor; }
   /// Along z of C0, 1/m, of the feature at this pixel of the left image, x/z and y/z of whose ray are given. None where nothing
   /// alike is seen near the epipolar curve.
   std::optional<MeasuredInverseDepth> at(const Vec2& left_px, const Vec2& left_normalised);
