@@ -77,7 +77,9 @@ struct FrontendStats {
   int recognised = 0;     ///< of these, re-observed: tracked again under their old id
   double mean_brightness_left = 0;
   double mean_brightness_right = 0;
-  double median_motion_px = 0;  ///< of the features continued, in the raw left image
+  /// Of the features continued, in the raw left image: `klt` from image to image, `orb` and `boost` from where they were
+  /// predicted.
+  double median_motion_px = 0;
   double pyramid_ms = 0, track_ms = 0, stereo_ms = 0, detect_ms = 0, geometry_ms = 0;
   DescriptorMatchCounts matches;      ///< over time, by the descriptors in use
   DescriptorMatchCounts raw_matches;  ///< what the descriptors would have found before they were improved
