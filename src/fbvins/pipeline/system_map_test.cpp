@@ -146,7 +146,7 @@ Flown fly_in(PlaceMap map, int cameras) {
   return flown;
 }
 
-/// Whoever made it: one camera has a place's depths from where it was before, two cameras have them at once.
+/// A map does not depend on the rig that made it: one camera has its depths from earlier keyframes, a pair from stereo.
 TEST(MapOfOneCamera, ClosesLoopsAndIsSharedWithAPair) {
   Flown first[3];
   for (const int cameras : {1, 2}) {
