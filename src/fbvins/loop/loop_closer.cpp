@@ -99,11 +99,13 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
               .reset_counter = keyframe.reset_counter,
               .began_map = map_.empty(),
               .q_LG = keyframe.gauge.q_LG,
-              .q_LG_newest = keyframe.gauge.q_LG};
+              .q_LG_newest = keyframe.gauge.q_LG,
+              .up_sigma_rad = keyframe.gauge.up_sigma_rad};
   drift_.restart();
   motion_.forget();
   relocaliser_.forget();
   frame_.forget();
+  vertical_.forget();
   follower_.forget();
   frame_.level(session_.q_LG);
   if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
@@ -112,11 +114,13 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
 /// Path, drift and readings up to a keyframe.
 void LoopCloser::advance(const Keyframe& keyframe) {
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
-  if (session_.T_GB) session_.path_m += (T_GB.p - session_.T_GB->p).norm();
-  session_.T_GB = T_GB;
+  const double step_m = session_.gauge ? (T_GB.p - session_.gauge->T_GB.p).norm() : 0;
+  session_.path_m += step_m;
+  session_.gauge = keyframe.gauge;
   motion_.add(keyframe);
   drift_.take(keyframe.pose_covariance, keyframe.gauge, session_.path_m);
   frame_.advance(T_GB, keyframe.t, drift_.rate());
+  vertical_.advance(drift_over(drift_.rate(), step_m, 0).yaw_rad2);
   const MapKeyframe* newest = map_.find(session_.newest);
   session_.readings.add(keyframe.imu.segments, keyframe.t, newest ? std::optional(newest->t) : std::nullopt);
 }
@@ -136,7 +140,6 @@ MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
     update.M_moved = level_by_newest();  // of the session that ends
     begin_session(keyframe);
   }
-  session_.up_sigma_rad = keyframe.gauge.up_sigma_rad;
   map_.gravity_mps2 = keyframe.imu.gravity_mps2;
   update.frame = keyframe.id;
   update.t = keyframe.t;
@@ -214,6 +217,7 @@ bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
   if (k.session == session_.number) seen.covariance *= kSharedError;
+  else vertical_.add(*session_.gauge, seen);
   frame_.update(seen);
   return true;
 }
@@ -237,6 +241,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
 void LoopCloser::found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen) {
   frame_.reset(T_MG, kFoundSigma_m, kFoundSigma_rad);
   frame_.update(seen);
+  vertical_.add(*session_.gauge, seen);
   join_session(frame_.T_MG());
 }
 
@@ -295,13 +300,14 @@ bool LoopCloser::optimisation_due() const {
 }
 
 /// Without anchors the measurements leave it open where M lies. It stays where its keyframes move least, and not with the first
-/// of them: those of a flight's first seconds err most, and a loop back to them would move all that came after.
+/// of them: those of a flight's first seconds err most, and a loop back to them would move all that came after. An older map
+/// stays where its own keyframes do, which the flight's must not drag along.
 PoseGraphReport LoopCloser::optimise_graph() {
   const auto poses = [this] {
-    std::vector<Pose<M, B>> all;
+    std::vector<Pose<M, B>> held;
     for (const MapKeyframe& k : map_.keyframes())
-      if (k.placed) all.push_back(k.T_MB);
-    return all;
+      if (k.placed && (join_.began_map() || !join_.is_of_flight(k.session))) held.push_back(k.T_MB);
+    return held;
   };
   const std::vector<Pose<M, B>> before = poses();
   const PoseGraphReport report = map_.optimise({options_.degrees_of_freedom});

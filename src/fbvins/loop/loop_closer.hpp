@@ -27,6 +27,7 @@
 #include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_map.hpp"
 #include "fbvins/loop/place_verifier.hpp"
+#include "fbvins/loop/place_vertical.hpp"
 #include "fbvins/loop/readings_since.hpp"
 #include "fbvins/loop/recent_motion.hpp"
 #include "fbvins/loop/relocaliser.hpp"
@@ -74,9 +75,9 @@ class LoopCloser final : public Mapper {
     bool localised = false;
     Quat q_LG = Quat::Identity();  ///< by which M, or the flight in an older one, is level
     Quat q_LG_newest = Quat::Identity();
-    double up_sigma_rad = 0;
+    double up_sigma_rad = 0;  ///< of the vertical, by gravity and places
     KeyframeId newest = {};
-    std::optional<Pose<G, B>> T_GB = {};  ///< of the last keyframe that was handed in
+    std::optional<GaugeState> gauge = {};  ///< of the last keyframe that was handed in
     double path_m = 0;
     ReadingsSince readings = {};  ///< the newest keyframe of the map
   };
@@ -126,6 +127,7 @@ class LoopCloser final : public Mapper {
   OdometryDrift drift_;
   FlightJoin join_;
   MapFrame frame_;
+  PlaceVertical vertical_;
   MapFrameFollower follower_;
   Relocaliser relocaliser_;
   Thinning thinning_;

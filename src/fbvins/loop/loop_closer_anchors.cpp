@@ -24,13 +24,16 @@ Vec6 sigma_of(double position_m2, double yaw_rad2) {
 
 }  // namespace
 
-/// Takes the newest estimate of gravity. Verticals follow it at once; M, where the flight began it, once it leans enough.
+/// Takes the newest estimate of gravity, and of an older map's vertical. Verticals of keyframes follow it at once; M, where the
+/// flight began it, once it leans enough.
 std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
-  if (gauge.q_LG.coeffs() != session_.q_LG_newest.coeffs()) map_.level(session_.number, gauge.q_LG);
-  session_.q_LG_newest = gauge.q_LG;
+  const LevelledGauge now = vertical_.level(gauge);
+  session_.up_sigma_rad = now.up_sigma_rad;
+  if (now.q_LG.coeffs() != session_.q_LG_newest.coeffs()) map_.level(session_.number, now.q_LG);
+  session_.q_LG_newest = now.q_LG;
   const bool may_lean = session_.began_map && map_.anchors.empty() && options_.degrees_of_freedom == 4;
-  const double leaning = std::max(kLeaning_rad, kLeaningSigmas * gauge.up_sigma_rad);
-  if (may_lean && angle_between(gauge.q_LG, session_.q_LG) <= leaning) return std::nullopt;
+  const double leaning = std::max(kLeaning_rad, kLeaningSigmas * now.up_sigma_rad);
+  if (may_lean && angle_between(now.q_LG, session_.q_LG) <= leaning) return std::nullopt;
   return level_by_newest();
 }
 
@@ -52,7 +55,7 @@ std::optional<Pose<M, M>> LoopCloser::level_by_newest() {
   session_.q_LG = session_.q_LG_newest;
   std::optional<Pose<M, M>> moved;
   if (session_.began_map && !map_.empty()) {
-    if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
+    if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.gauge->T_GB.p));
     else map_.move(upright), frame_.turn(upright), moved = upright;
   } else {
     for (auto k = map_.keyframes().rbegin(); k != map_.keyframes().rend() && k->session == session_.number; ++k)
@@ -110,7 +113,7 @@ AnchoredPose LoopCloser::anchored_pose(const MapAnchor& anchor) const {
   if (map_.anchored) pose.q_XB = session_.q_LG * k.T_GB.q, pose.p_XB = session_.q_LG * k.T_GB.p;
   if (k.session != session_.number) return pose;
   const DriftVariance drift = drift_over(drift_.rate(), session_.path_m - k.path_m, (motion_.newest() - k.t).seconds());
-  const double away_m2 = (session_.T_GB->p - k.T_GB.p).squaredNorm();
+  const double away_m2 = (session_.gauge->T_GB.p - k.T_GB.p).squaredNorm();
   pose.measured.information =
       widened(pose.measured.information, sigma_of(drift.position_m2 + drift.yaw_rad2 * away_m2, drift.yaw_rad2).asDiagonal());
   return pose;
@@ -131,7 +134,7 @@ std::vector<AnchoredPose> LoopCloser::anchored_poses() const {
 /// Where M lies in the building or, once that is known, where a flight that is not localised lies in M.
 void LoopCloser::find_building(MapUpdate& update) {
   if (map_.anchored == frame_.known()) return;  // a flight that is not localised in M says nothing of M
-  const Pose<G, B>& T_GB = *session_.T_GB;
+  const Pose<G, B>& T_GB = session_.gauge->T_GB;
   const std::optional<AnchorFit> fit =
       fit_anchors(anchored_poses(), frame_.known() ? frame_.T_MG() * T_GB.p : Vec3(session_.q_LG * T_GB.p));
   if (!fit) return;

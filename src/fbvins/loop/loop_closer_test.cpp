@@ -186,6 +186,35 @@ TEST(LoopCloser, ALaterFlightsGaugeIsItsOwn) {
   EXPECT_LT((again.map().keyframes()[0].T_MB.p - first_before).norm(), 0.003) << "the old map's frame stays";
 }
 
+TEST(LoopCloser, AnOlderMapSaysWhereUpIsAndIsNotMovedByAFlightThatDoesNotKnow) {
+  LoopCloser first(rig(), {}, vocabulary());
+  run(first, flight(room(1), 120, 0, 0, 2));
+  LoopCloser again(rig(), {}, vocabulary(), first.map());
+  const auto frames = flight(room(1), 60, 0.002, 0.02, 9, 7.3);
+  double worst_m = 0, worst_rad = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Keyframe k = leaning(FrameId{static_cast<std::int64_t>(i)}, frames[i], 0);  // by 2.9 degrees, to the end
+    const MapUpdate u = again.process(frames[i].place, k);
+    if (i < 10) continue;
+    ASSERT_TRUE(u.localised);
+    const Pose<M, B> T_MB = u.T_MG * k.gauge.T_GB;
+    worst_m = std::max(worst_m, (T_MB.p - frames[i].truth.p).norm());
+    const Vec3 up = T_MB.q.conjugate() * Vec3::UnitZ(), true_up = frames[i].truth.q.conjugate() * Vec3::UnitZ();
+    worst_rad = std::max(worst_rad, (up - true_up).norm());
+  }
+  EXPECT_LT(worst_m, 0.02);
+  EXPECT_LT(worst_rad, 0.3 * kDegree);
+  again.finish();
+  int kept = 0;
+  for (const MapKeyframe& k : first.map().keyframes()) {
+    const MapKeyframe* now = again.map().find(k.id);
+    if (now == nullptr) continue;
+    ++kept;
+    EXPECT_LT((now->T_MB.p - k.T_MB.p).norm(), 0.006) << k.id.value;
+  }
+  EXPECT_GT(kept, 40);
+}
+
 /// A keyframe without images, a second after the one before, with the readings since then of an IMU at rest.
 Keyframe seconds_later(int number, double x_m, double yaw_rad = 0) {
   Keyframe k = keyframe(FrameId{number}, Time{} + Duration::from_seconds(number), {about_z(yaw_rad), Vec3(x_m, 0, 0)});

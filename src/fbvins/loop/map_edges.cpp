@@ -58,6 +58,7 @@ MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge) {
   J.topLeftCorner<3, 3>() = R;
   J.bottomRightCorner<1, 3>() = R_q.row(2);
   seen.covariance = J * cov * J.transpose();
+  seen.tilt_variance_rad2 = 0.5 * (cov.bottomRightCorner<3, 3>().trace() - seen.covariance(3, 3));
   return seen;
 }
 

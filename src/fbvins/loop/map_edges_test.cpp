@@ -49,6 +49,7 @@ TEST(LoopEdge, IsThePoseOfTheBodyAndPutsItWhereItIs) {
   const MeasuredPose seen = measured_pose(candidate, edge);
   EXPECT_LT((seen.T_MB.p - T_MB_query.p).norm(), 1e-12);
   EXPECT_LT(angle_between(seen.T_MB.q, T_MB_query.q), 1e-6);
+  EXPECT_NEAR(seen.tilt_variance_rad2, edge.information.inverse()(3, 3), 1e-9) << "its attitude is as certain about every axis";
 }
 
 TEST(LoopEdge, ItsCovarianceIsThatOfTheCamerasTwiceOver) {

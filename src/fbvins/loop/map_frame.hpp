@@ -36,6 +36,7 @@ DriftVariance drift_over(const DriftOptions& options, double metres, double seco
 struct MeasuredPose {
   Pose<M, B> T_MB;
   Mat4 covariance = Mat4::Identity();
+  double tilt_variance_rad2 = 0;  ///< of roll and pitch, each
 };
 
 /// Yaw of a rotation that is nearly about z, rad; and the rotation about z by an angle.
