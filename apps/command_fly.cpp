@@ -114,6 +114,7 @@ Result<FlightSetup> setup_of(const Arguments& a, Config& config) {
   Result<ControllerProgram> controller = controller_of(a);
   if (!controller) return controller.error();
   setup.controller = *std::move(controller);
+  setup.controller.in_map = a.loop;
   return setup;
 }
 

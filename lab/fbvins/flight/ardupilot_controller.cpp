@@ -9,12 +9,12 @@ namespace {
 /// It calibrates its sensors and levels itself.
 constexpr double kArduPilotWarmUp_s = 20;
 
-MavlinkOptions ardupilot_options(const Pose<BodyFlu, B>& mounting) {
+MavlinkOptions ardupilot_options(const Pose<BodyFlu, B>& mounting, bool in_map) {
   MavlinkOptions options;
   options.system_id = ArduPilotProcess::kSystemId;
   options.rate_hz = kCompanionRate_hz;
   options.dialect = MavlinkDialect::ardupilot;
-  options.mounting = mounting_options_of(mounting);
+  options.mounting = mounting_options_of(mounting, in_map);
   return options;
 }
 
@@ -28,7 +28,8 @@ Result<std::unique_ptr<FlightController>> ArduPilotController::create(const Cont
   if (!ardupilot) return ardupilot.error();
   // It sends from a port that only its first packet tells.
   const std::uint16_t port = (*ardupilot)->companion_port();
-  const Link link{UdpAddress{"127.0.0.1", port, port, true}, ardupilot_options(mounting), kArduPilotWarmUp_s, kArduPilotWarmUp_s};
+  const Link link{UdpAddress{"127.0.0.1", port, port, true}, ardupilot_options(mounting, program.in_map), kArduPilotWarmUp_s,
+                  kArduPilotWarmUp_s};
   std::unique_ptr<ArduPilotController> controller(new ArduPilotController(*std::move(ardupilot), link, mission, rig));
   if (Result<void> done = controller->open(program.folder); !done) return done.error();
   return std::unique_ptr<FlightController>(std::move(controller));

@@ -30,8 +30,7 @@ Result<std::unique_ptr<FlightController>> start_controller(const ControllerProgr
 class CompanionController : public FlightController {
  public:
   void add(const Odometry& odometry) override { propagator_.rebase(odometry); }
-  /// It flies in W.
-  void add(const MapUpdate&) override {}
+  void add(const MapUpdate& update) override { session_.take(update); }
   void add_barometer(double height_m) override { height_m_ = height_m; }
   Result<void> take(const ImuSample& reading) override;
   Result<void> take_board(const BoardReading& reading) override;

@@ -14,7 +14,8 @@ struct ControllerProgram {
   };
   Kind kind = Kind::own;
   std::string binary;
-  std::string folder;  ///< for its parameters and logs; deleted and created at the start
+  std::string folder;   ///< for its parameters and logs; deleted and created at the start
+  bool in_map = false;  ///< a real flight controller gets poses in M (docs/px4.md)
 };
 
 }  // namespace fbvins

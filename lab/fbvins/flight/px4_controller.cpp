@@ -13,13 +13,13 @@ constexpr double kPx4WarmUp_s = 56;
 /// PX4's clock at the beginning of the warm-up.
 constexpr double kPx4Boot_s = 1;
 
-MavlinkOptions px4_options(int system_id, const Pose<BodyFlu, B>& mounting) {
+MavlinkOptions px4_options(int system_id, const Pose<BodyFlu, B>& mounting, bool in_map) {
   MavlinkOptions options;
   options.system_id = system_id;
   options.rate_hz = kCompanionRate_hz;
   // PX4 since February 2026 does not arm with local_frd. There is no GPS or magnetometer with another heading.
   options.frame = MavlinkFrameId::local_ned;
-  options.mounting = mounting_options_of(mounting);
+  options.mounting = mounting_options_of(mounting, in_map);
   return options;
 }
 
@@ -30,8 +30,8 @@ Result<std::unique_ptr<FlightController>> Px4Controller::create(const Controller
                                                                 const StereoRig& rig, const Pose<BodyFlu, B>& mounting) {
   Result<std::unique_ptr<Px4Process>> px4 = Px4Process::start(program.binary, program.folder, px4_parameters(control, vehicle));
   if (!px4) return px4.error();
-  const Link link{UdpAddress{"127.0.0.1", (*px4)->companion_port(), 0}, px4_options((*px4)->system_id(), mounting), kPx4WarmUp_s,
-                  kPx4WarmUp_s + kPx4Boot_s};
+  const Link link{UdpAddress{"127.0.0.1", (*px4)->companion_port(), 0},
+                  px4_options((*px4)->system_id(), mounting, program.in_map), kPx4WarmUp_s, kPx4WarmUp_s + kPx4Boot_s};
   std::unique_ptr<Px4Controller> controller(new Px4Controller(*std::move(px4), link, mission, rig));
   if (Result<void> done = controller->open(program.folder); !done) return done.error();
   return std::unique_ptr<FlightController>(std::move(controller));

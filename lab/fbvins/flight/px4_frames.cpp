@@ -63,13 +63,14 @@ const Px4Parameters& fixed_parameters() {
 Vec3 flu_to_frd(const Vec3& v) { return {v.x(), -v.y(), -v.z()}; }
 Quat flu_to_frd(const Quat& q) { return {q.w(), q.x(), -q.y(), -q.z()}; }
 
-MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting) {
+MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting, bool in_map) {
   const Quat half_turn(0, 1, 0, 0);
   const Quat q_FB = half_turn * mounting.q;
   MountingOptions best;
   double least = 10;  // the axes with the smallest residual rotation are far from gimbal lock
   for (const ImuAxes axes : {ImuAxes::flu, ImuAxes::frd, ImuAxes::camera_fwd, ImuAxes::camera_down}) {
     MountingOptions options;
+    if (in_map) options.local_frame = LocalOrigin::map;
     options.imu_axes = axes;
     const Quat turn = q_FB * fbvins::mounting(options).q.conjugate();
     const double angle = so3_log(turn).norm();

@@ -21,8 +21,8 @@ struct Px4Local {};
 Vec3 flu_to_frd(const Vec3& v);
 Quat flu_to_frd(const Quat& q);
 
-/// A mounting as options of `fbvins live`.
-MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting);
+/// A mounting as options of `fbvins live`; `in_map`: with M for the local frame.
+MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting, bool in_map = false);
 
 /// PX4's own estimate, in N (returned as L, with T_LN the identity).
 VehicleEstimate estimate_of(const OdometryMessage& message);
