@@ -68,14 +68,23 @@ std::vector<Place> possible_places(const World& world, const Simulation& s, doub
   return out;
 }
 
-/// Rows from the top: a facet shows its texture upright where v points down and u to the left (renderer.cpp).
+/// Rows from the top: a facet shows its texture upright where v points down and u to the left (renderer.cpp). Edges of cells lie
+/// at fifths of a texel.
 Canvas paper(const TagCells& cells) {
+  constexpr int kParts = 5;
+  static_assert(kTextureSize * kParts % kCells == 0);
+  const auto cell_at = [](int part) { return part * kCells / (kTextureSize * kParts) - 1; };
+  const auto is_black = [&](int column, int row) {
+    const bool on_tag = column >= 0 && column < 8 && row >= 0 && row < 8;
+    return on_tag && cells[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
+  };
   Canvas out;
   for (int y = 0; y < kTextureSize; ++y)
     for (int x = 0; x < kTextureSize; ++x) {
-      const int column = x * kCells / kTextureSize - 1, row = y * kCells / kTextureSize - 1;
-      const bool on_tag = column >= 0 && column < 8 && row >= 0 && row < 8;
-      out.at(x, y) = on_tag && cells[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] ? 0.06f : 0.9f;
+      int black = 0;
+      for (int j = 0; j < kParts; ++j)
+        for (int i = 0; i < kParts; ++i) black += is_black(cell_at(x * kParts + i), cell_at(y * kParts + j)) ? 1 : 0;
+      out.at(x, y) = 0.9f - 0.84f * static_cast<float>(black) / (kParts * kParts);
     }
   return out;
 }

@@ -11,14 +11,18 @@
 namespace fbvins {
 namespace {
 
-/// Halton sequence (bases 2 and 3): sample positions that fill the pixel evenly, whatever their number.
-Vec2 place_in_pixel(int i) {
+/// Halton sequence (bases 2 and 3): sample positions that fill the pixel evenly, whatever their number. Their mean is its middle,
+/// or the image would be shifted against the lens.
+Vec2 place_in_pixel(int i, int samples) {
   const auto radical = [](int n, int base) {
     double value = 0, share = 1.0 / base;
     for (; n > 0; n /= base, share /= base) value += share * (n % base);
     return value;
   };
-  return {radical(i + 1, 2) - 0.5, radical(i + 1, 3) - 0.5};
+  const auto place = [&](int n) { return Vec2(radical(n + 1, 2), radical(n + 1, 3)); };
+  Vec2 mean = Vec2::Zero();
+  for (int n = 0; n < samples; ++n) mean += place(n) / samples;
+  return place(i) - mean;
 }
 
 }  // namespace
@@ -91,7 +95,7 @@ void FlightRecorder::add_instant(Eye& eye, double t_s, int sample, int samples) 
   instant.p_WC = m.T_WB * p_BC + world_from_flight_;
   instant.v_WC = m.v_WB + m.T_WB.q * m.w_WB_B.cross(p_BC);
   instant.line_s = line_s;
-  instant.shift_px = place_in_pixel(sample);
+  instant.shift_px = place_in_pixel(sample, samples);
   const LightState lamps = light_at(options_.light, *world_, t_s, static_cast<std::uint64_t>(options_.seed));
   eye.facets = world_->facets;
   for (Facet& f : eye.facets)
