@@ -7,6 +7,7 @@
 
 #include "fbvins/calibration/board_pose.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
+#include "fbvins/calibration/tag_alignment.hpp"
 
 namespace fbvins {
 namespace {
@@ -18,7 +19,19 @@ constexpr double kSmallest_px = 16;
 /// The second pose of a small tag is possible up to this squared distance in standard deviations.
 constexpr double kPossible = 9;
 
-/// Of (dp in the camera, dtheta in the tag).
+/// Adds that it may be the other pose.
+void widen(Mat6& covariance, const Pose<Cn, T>& pose, const Pose<Cn, T>& other) {
+  Vec6 apart;
+  apart << other.p - pose.p, so3_log(pose.q.conjugate() * other.q);
+  covariance += apart * apart.transpose();
+}
+
+struct TagPose {
+  Pose<Cn, T> T_CnT;
+  Mat6 covariance;  ///< of (dp in the camera, dtheta in the tag)
+};
+
+/// By the corners alone.
 Mat6 covariance_of(const Camera& camera, const Board& board, const PosedBoard& posed) {
   Mat6 information = Mat6::Zero();
   const Mat3 R = posed.T_CnT.R();
@@ -32,12 +45,20 @@ Mat6 covariance_of(const Camera& camera, const Board& board, const PosedBoard& p
   }
   Mat6 covariance = information.inverse();
   // Which of the two poses it is may be open: as far as one is from the other, it is not known.
-  if (2 * posed.other_costs_px2 < kPossible * kCorner_px * kCorner_px) {
-    Vec6 apart;
-    apart << posed.other.p - posed.T_CnT.p, so3_log(posed.T_CnT.q.conjugate() * posed.other.q);
-    covariance += apart * apart.transpose();
-  }
+  if (2 * posed.other_costs_px2 < kPossible * kCorner_px * kCorner_px) widen(covariance, posed.T_CnT, posed.other);
   return 0.5 * (covariance + covariance.transpose());
+}
+
+/// By all pixels, from both poses; nullopt where the image does not fit the pattern.
+std::optional<TagPose> by_pixels(const ImageView& image, const Camera& camera, const TagCells& cells, double size_m,
+                                 const PosedBoard& posed) {
+  std::optional<AlignedTag> best = align_tag(image, camera, cells, size_m, posed.T_CnT),
+                            other = align_tag(image, camera, cells, size_m, posed.other);
+  if (!best || (other && other->squared_error < best->squared_error)) std::swap(best, other);
+  if (!best) return std::nullopt;
+  if (other && other->squared_error - best->squared_error < kPossible * best->variance)
+    widen(best->covariance, best->T_CnT, other->T_CnT);
+  return TagPose{best->T_CnT, best->covariance};
 }
 
 }  // namespace
@@ -53,9 +74,12 @@ TagFinder::TagFinder(const StereoRig& rig, TagSurvey survey, TagDetector detecto
       T_BC0_(rig.T_BC0),
       survey_(std::move(survey)),
       board_{BoardKind::aprilgrid, 1, 1, survey_.size_m, 0.3},
-      detector_(std::move(detector)) {}
+      detector_(std::move(detector)) {
+  for (const auto& [id, T_AT] : survey_.T_AT)
+    if (const Result<TagCells> cells = tag_cells(id)) cells_[id] = *cells;
+}
 
-std::optional<TagAnchor> TagFinder::posed(const TagDetection& seen) const {
+std::optional<TagAnchor> TagFinder::posed(const TagDetection& seen, const ImageView& image) const {
   std::vector<BoardCorner> corners;
   for (int k = 0; k < 4; ++k) {
     if ((seen.corners[k] - seen.corners[(k + 1) % 4]).norm() < kSmallest_px) return std::nullopt;
@@ -67,16 +91,20 @@ std::optional<TagAnchor> TagFinder::posed(const TagDetection& seen) const {
     const auto pixel = project_point(camera_.model(), posed->T_CnT * board_.corner(corner.index));
     if (!pixel || (*pixel - corner.pixel).norm() > kLargestError_px) return std::nullopt;
   }
+  std::optional<TagPose> pose;
+  if (const auto cells = cells_.find(seen.id); cells != cells_.end())
+    pose = by_pixels(image, camera_, cells->second, board_.size_m, *posed);
+  if (!pose) pose = TagPose{posed->T_CnT, covariance_of(camera_, board_, *posed)};
   // From the board's frame, at the first corner, to the tag's, in its middle: the rotation's error moves the middle.
   const Vec3 middle(0.5 * board_.size_m, 0.5 * board_.size_m, 0);
   Mat6 J = Mat6::Identity();
-  J.topRightCorner<3, 3>() = -posed->T_CnT.R() * hat(middle);
+  J.topRightCorner<3, 3>() = -pose->T_CnT.R() * hat(middle);
   Mat6 turn = Mat6::Identity();
   turn.topLeftCorner<3, 3>() = T_BC0_.R();
   TagAnchor out{.id = seen.id, .T_AT = survey_.T_AT.at(seen.id)};
-  const Pose<C0, Tag> T_CT(posed->T_CnT.q, posed->T_CnT * middle);
+  const Pose<C0, Tag> T_CT(pose->T_CnT.q, pose->T_CnT * middle);
   out.T_BT = T_BC0_ * T_CT;
-  out.covariance = turn * J * covariance_of(camera_, board_, *posed) * J.transpose() * turn.transpose();
+  out.covariance = turn * J * pose->covariance * J.transpose() * turn.transpose();
   out.covariance = 0.5 * (out.covariance + out.covariance.transpose()).eval();
   return out;
 }
@@ -88,7 +116,7 @@ std::vector<TagAnchor> TagFinder::find(const StereoFrame& frame) {
   for (const TagDetection& seen : all) {
     const auto of_id = std::ranges::count(all, seen.id, &TagDetection::id);
     if (of_id > 1 || !survey_.T_AT.contains(seen.id)) continue;
-    auto anchor = posed(seen);
+    auto anchor = posed(seen, frame.left->view());
     if (!anchor) continue;
     anchor->t = frame.t;
     if (impossible(*anchor).empty()) out.push_back(*anchor);

@@ -7,6 +7,7 @@
 //   auto system = System::create(options, rig, RunMode::threaded, {.mapper = &mapper});
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -28,12 +29,13 @@ class TagFinder {
 
  private:
   TagFinder(const StereoRig& rig, TagSurvey survey, TagDetector detector);
-  std::optional<TagAnchor> posed(const TagDetection& seen) const;
+  std::optional<TagAnchor> posed(const TagDetection& seen, const ImageView& image) const;
 
   Camera camera_;
   Pose<B, C0> T_BC0_;
   TagSurvey survey_;
   Board board_;  ///< of one tag
+  std::map<int, TagCells> cells_;
   TagDetector detector_;
 };
 
