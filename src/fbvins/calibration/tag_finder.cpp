@@ -19,11 +19,14 @@ constexpr double kSmallest_px = 16;
 /// The second pose of a small tag is possible up to this squared distance in standard deviations.
 constexpr double kPossible = 9;
 
-/// Adds that it may be the other pose.
+/// Adds that it may be the other pose: on the way from one to the other, which is none along a line, and so by as much to all
+/// sides.
 void widen(Mat6& covariance, const Pose<Cn, T>& pose, const Pose<Cn, T>& other) {
   Vec6 apart;
   apart << other.p - pose.p, so3_log(pose.q.conjugate() * other.q);
   covariance += apart * apart.transpose();
+  covariance.diagonal().head<3>().array() += apart.head<3>().squaredNorm();
+  covariance.diagonal().tail<3>().array() += apart.tail<3>().squaredNorm();
 }
 
 struct TagPose {

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <set>
 
-#include "fbvins/loop/pose_graph.hpp"
-
 namespace fbvins {
 namespace {
 
@@ -33,7 +31,7 @@ class Judges {
     for (const AnchoredPose& pose : poses) {
       const Vec3 up_B = pose.q_XB.conjugate() * Vec3::UnitZ();
       // The lever arm is turned to A by an angle not known yet; for a tilt its length is what counts.
-      const Mat6 L = tilt_error(pose.measured, pose.q_XB, up_B, kTilt_rad);
+      const Mat6 L = tilt_error(pose.measured, pose.q_XB, up_B, pose.tilt_rad);
       all_.push_back({&pose, root_of(widened(pose.measured.information, L))});
     }
   }

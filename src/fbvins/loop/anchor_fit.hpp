@@ -21,6 +21,7 @@ struct AnchoredPose {
   Vec3 p_XB = Vec3::Zero();
   PartialPose measured;  ///< widened by what the poses have drifted since
   KeyframeId keyframe;
+  double tilt_rad = kTilt_rad;  ///< standard deviation of its roll and pitch
 };
 
 struct AnchorFit {

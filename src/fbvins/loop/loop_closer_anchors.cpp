@@ -13,6 +13,8 @@ namespace {
 constexpr std::size_t kMostOfAKeyframe = 8;
 /// Anchors by which M is found: of more, evenly so many.
 constexpr std::size_t kMostToFind = 400;
+/// Of more anchors, the error of the vertical that they share is taken for that of so many.
+constexpr std::size_t kMostAlike = 16;
 /// A new M is levelled anew where it leans by more than this, and by more than so many standard deviations of the vertical.
 constexpr double kLeaning_rad = 0.25 * kDegree, kLeaningSigmas = 3;
 
@@ -29,6 +31,7 @@ Vec6 sigma_of(double position_m2, double yaw_rad2) {
 std::optional<Pose<M, M>> LoopCloser::level(const GaugeState& gauge) {
   const LevelledGauge now = vertical_.level(gauge);
   session_.up_sigma_rad = now.up_sigma_rad;
+  frame_.set_tilt_sigma(std::max(kTilt_rad, now.up_sigma_rad));
   if (now.q_LG.coeffs() != session_.q_LG_newest.coeffs()) map_.level(session_.number, now.q_LG);
   session_.q_LG_newest = now.q_LG;
   const bool may_lean = session_.began_map && map_.anchors.empty() && options_.degrees_of_freedom == 4;
@@ -127,7 +130,12 @@ std::vector<AnchoredPose> LoopCloser::anchored_poses() const {
   }
   std::vector<AnchoredPose> poses;
   const std::size_t count = std::min(usable.size(), kMostToFind);
-  for (std::size_t i = 0; i < count; ++i) poses.push_back(anchored_pose(*usable[i * usable.size() / count]));
+  // The vertical is wrong by the same for all of them, so that their mean is no better.
+  const double shared = std::sqrt(static_cast<double>(std::min(count, kMostAlike)));
+  for (std::size_t i = 0; i < count; ++i) {
+    poses.push_back(anchored_pose(*usable[i * usable.size() / count]));
+    poses.back().tilt_rad = std::max(kTilt_rad, shared * session_.up_sigma_rad);
+  }
   return poses;
 }
 

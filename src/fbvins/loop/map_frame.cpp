@@ -102,7 +102,7 @@ void MapFrame::update(const MeasuredPose& seen) {
 MapFrame::Whitened MapFrame::innovation(const PartialPose& seen, const Pose<G, B>& T_GB) const {
   const Pose<M, B> T_MB = T_MG_ * T_GB;
   const Vec3 up_B = T_MB.q.conjugate() * Vec3::UnitZ();
-  const Mat6 S = root_of(widened(seen.information, tilt_error(seen, T_MB.q, up_B, kTilt_rad)));
+  const Mat6 S = root_of(widened(seen.information, tilt_error(seen, T_MB.q, up_B, tilt_rad_)));
   Eigen::Matrix<double, 6, 4> H = Eigen::Matrix<double, 6, 4>::Zero();
   H.topLeftCorner<3, 3>().setIdentity();
   H.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MB * seen.p_B - T_MG_ * body());

@@ -59,6 +59,8 @@ class MapFrame {
   void forget() { known_ = false, last_.reset(); }
   /// Takes a new estimate of q_LG, which turns G level: the body stays where it is in M, and so does the yaw.
   void level(const Quat& q_LG);
+  /// Of roll and pitch of G in M, where an anchor is taken for what they change in it.
+  void set_tilt_sigma(double rad) { tilt_rad_ = rad; }
   /// All of M is turned, the body with it: T takes old coordinates in M to new ones. Call level() afterwards.
   void turn(const Pose<M, M>& T) { T_MG_ = T * T_MG_; }
   /// Sets the frame, with standard deviations of position and of yaw. Of T_MG only the yaw and where it puts the body are
@@ -90,7 +92,7 @@ class MapFrame {
 
   bool known_ = false;
   Quat q_LG_ = Quat::Identity();
-  double yaw_rad_ = 0;
+  double yaw_rad_ = 0, tilt_rad_ = kTilt_rad;
   Pose<M, G> T_MG_;
   Mat4 P_ = Mat4::Zero();
   std::optional<Stamped> last_;

@@ -8,10 +8,14 @@
 //   double chi2 = r.dot(height.information * r);
 #pragma once
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/anchor.hpp"
 
 namespace fbvins {
+
+/// Standard deviation of roll and pitch as the odometry estimates them once it has moved.
+inline constexpr double kTilt_rad = 0.4 * kDegree;
 
 struct PartialPose {
   Vec3 p_B = Vec3::Zero();          ///< the point of the body whose position is measured

@@ -13,15 +13,11 @@
 
 #include <vector>
 
-#include "fbvins/core/angle.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/loop/map_report.hpp"
 #include "fbvins/loop/partial_pose.hpp"
 
 namespace fbvins {
-
-/// Standard deviation of roll and pitch as the odometry estimates them.
-inline constexpr double kTilt_rad = 0.4 * kDegree;
 
 struct PoseGraphOptions {
   int degrees_of_freedom = 4;  ///< 4: position and yaw; 6: roll and pitch as well
