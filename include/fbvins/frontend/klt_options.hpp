@@ -15,7 +15,7 @@ struct KltFrontendOptions {
   template <class V>
   void visit(V&& v) {
     v("max_features", max_features, "",
-      "features followed at once by a pair of cameras; more than two pairs or single cameras share twice as many", 10, 2000);
+      "features followed at once by a pair of cameras; two pairs share a third more, three or more twice as many", 10, 2000);
     v("min_distance_px", min_distance_px, "px", "smallest distance between features; half the side of the cells that share them",
       4.0, 200.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);

@@ -37,7 +37,7 @@ struct OrbFrontendOptions {
   template <class V>
   void visit(V&& v) {
     v("max_features", max_features, "",
-      "features followed at once by a pair of cameras; more than two pairs or single cameras share twice as many", 10, 2000);
+      "features followed at once by a pair of cameras; two pairs share a third more, three or more twice as many", 10, 2000);
     v("max_keypoints", max_keypoints, "", "keypoints extracted from one image, as candidates for tracks", 10, 10000);
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");

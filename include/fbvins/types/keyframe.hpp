@@ -39,6 +39,8 @@ struct Keyframe {
   GaugeState gauge;  ///< in the estimator's own frame, not levelled
   /// Of gauge.T_GB, as (dp in G, dtheta in B), since G began; zero: unknown.
   Mat6 pose_covariance = Mat6::Zero();
+  /// Of all distances together, as Odometry::scale_sigma; 0: the cameras measure them.
+  double scale_sigma = 0;
   Pose<W, G> T_WG;                  ///< of the newest published pose when this was handed on; set by the pipeline
   std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, with no known relation to the old
   StereoFrame images;

@@ -309,6 +309,7 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
       keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
       keyframe.pose_covariance = window_.known().with_map_covariance(frame.state.T_FB, covariance->topLeftCorner<6, 6>());
     }
+    keyframe.scale_sigma = scale_known_;
     keyframe.reset_counter = reset_counter_;
     out.push_back(std::move(keyframe));
   }

@@ -18,13 +18,14 @@ namespace fbvins {
 /// The rig with left and right exchanged.
 StereoRig mirrored(const StereoRig& rig);
 
-class EitherCamera final : public Frontend {
+class EitherCamera final : public SharingFrontend {
  public:
   /// `right`: for the mirrored rig.
   EitherCamera(const StereoRig& rig, std::unique_ptr<LeadingFrontend> left, std::unique_ptr<LeadingFrontend> right);
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
   void locate(const LandmarkUpdate& update) override;
+  void follow_at_most(int features) override { left_->follow_at_most(features), right_->follow_at_most(features); }
 
  private:
   void choose(const StereoFrame& frame);

@@ -19,14 +19,12 @@ namespace {
 
 using Made = Result<std::unique_ptr<Frontend>>;
 
-/// The tracks of a rig, and the keypoints extracted for them, are twice those of one pair at most; each group of cameras has its
+/// The keypoints that are extracted for the tracks of a rig are twice those of one pair at most; each group of cameras has its
 /// share.
 template <class Options>
 Options shared_by(Options options, std::size_t groups) {
-  const auto share = [&](int& count) { count = std::max(1, 2 * count / static_cast<int>(groups)); };
-  if (groups <= 2) return options;
-  share(options.max_features);
-  if constexpr (requires { options.max_keypoints; }) share(options.max_keypoints);
+  if constexpr (requires { options.max_keypoints; })
+    if (groups > 2) options.max_keypoints = std::max(1, 2 * options.max_keypoints / static_cast<int>(groups));
   return options;
 }
 
@@ -38,7 +36,7 @@ std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, const Options& of
   const auto leads = [&](int camera) { return std::ranges::find(groups, camera, &CameraGroup::first) != groups.end(); };
   const Options options = shared_by(of_rig, groups.size());
   const auto lead = [&](const StereoRig& cameras) { return lead_with(cameras, options); };
-  std::vector<std::unique_ptr<Frontend>> frontends;
+  std::vector<std::unique_ptr<SharingFrontend>> frontends;
   for (const CameraGroup& group : groups) {
     const StereoRig cameras = rig_of(rig, group);
     if (group.second && !leads(*group.second))
@@ -46,7 +44,7 @@ std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, const Options& of
     else frontends.push_back(lead(cameras));
   }
   if (groups.size() == 1) return std::move(frontends.front());
-  return std::make_unique<RigFrontend>(groups, std::move(frontends));
+  return std::make_unique<RigFrontend>(groups, std::move(frontends), of_rig.max_features);
 }
 
 Made make_klt(const StereoRig& rig, const FrontendOptions& options) {

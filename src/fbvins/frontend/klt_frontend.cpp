@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/klt_frontend.hpp"
 
+#include <algorithm>
+
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/frontend/observe.hpp"
 
@@ -16,6 +18,7 @@ constexpr std::size_t kFewestForLongCheck = 12;
 
 KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options)
     : options_(options),
+      most_(options.max_features),
       rig_(rig),
       images_(rig, kKltLevels),
       predictor_(rig.T_BC0),
@@ -111,7 +114,7 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
   std::vector<Vec2> occupied;
   occupied.reserve(tracks_.size());
   for (const KltTrack& track : tracks_) occupied.push_back(track.px);
-  const int wanted = options_.max_features - static_cast<int>(tracks_.size());
+  const int wanted = std::min(most_, options_.max_features) - static_cast<int>(tracks_.size());
   for (const Corner& corner : detector_.detect(images_.left(), occupied, wanted, rig_.left.mask().get()))
     if (start_track(corner.px)) ++stats.detected;
 }

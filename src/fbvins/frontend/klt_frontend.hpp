@@ -31,6 +31,7 @@ class KltFrontend final : public LeadingFrontend {
   /// Landmarks are ignored; what voids earlier positions voids the prior.
   void locate(const LandmarkUpdate& update) override;
 
+  void follow_at_most(int features) override { most_ = features; }
   void stand_by(const SensorPacket& packet, const StatePrior& prior) override { predictor_.add(packet.imu, prior); }
   bool reaches(Time t) const override { return images_.reaches(t, options_.max_gap_s); }
   void begin_ids_at(std::int64_t id) override { tracks_.begin_ids_at(id); }
@@ -49,6 +50,7 @@ class KltFrontend final : public LeadingFrontend {
   bool measure_depth(KltTrack& track);
 
   KltFrontendOptions options_;
+  int most_;  ///< features
   StereoRig rig_;
   FrameImages images_;
   MotionPredictor predictor_;

@@ -25,6 +25,7 @@ OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features
 
 OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::shared_ptr<DescriptorStage> stage)
     : options_(options),
+      most_(options.max_features),
       sigma_px_(options.subpixel ? options.sigma_px : kSigmaUnrefined_px),
       camera_(rig.left),
       T_C1C0_(rig.T_C1C0()),
@@ -110,7 +111,7 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   outliers_.judge(tracks_, view_, predictor_, stats);
   drop_ended();
   if (examined) matcher_.count_inliers(tracks_, stats);
-  thin_out(tracks_, options_.max_features, options_.min_distance_px);
+  thin_out(tracks_, most_, options_.min_distance_px);
   forget(tracks_, view_.t, options_.memory_s);
   drop_ended();
   stats.geometry_ms = timer.lap_ms();
@@ -137,6 +138,11 @@ void OrbFrontend::locate(const LandmarkUpdate& update) {
 bool OrbFrontend::can_reobserve(TrackId track) const {
   return recogniser_.remembers(track) ||
          std::any_of(tracks_.begin(), tracks_.end(), [&](const OrbTrack& t) { return t.id == track; });
+}
+
+void OrbFrontend::follow_at_most(int features) {
+  most_ = std::min(features, options_.max_features);
+  starter_.want(most_);
 }
 
 void OrbFrontend::stand_by(const SensorPacket& packet, const StatePrior& prior) {

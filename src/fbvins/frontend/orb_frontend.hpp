@@ -35,6 +35,7 @@ class OrbFrontend final : public LeadingFrontend {
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
   void locate(const LandmarkUpdate& update) override;
 
+  void follow_at_most(int features) override;
   void stand_by(const SensorPacket& packet, const StatePrior& prior) override;
   bool reaches(Time t) const override { return images_.reaches(t, longest_gap_s()); }
   void begin_ids_at(std::int64_t id) override { tracks_.begin_ids_at(id); }
@@ -53,6 +54,7 @@ class OrbFrontend final : public LeadingFrontend {
   bool resume(const HandedTrack& handed, const Pyramid& image);
 
   OrbFrontendOptions options_;
+  int most_;         ///< features
   double sigma_px_;  // of an observation
   Camera camera_;
   Pose<C1, C0> T_C1C0_;

@@ -19,6 +19,7 @@ class OrbStarter {
   OrbStarter(const Camera& camera, int wanted, double min_distance_px)
       : camera_(camera), wanted_(wanted), min_distance_px_(min_distance_px) {}
 
+  void want(int tracks) { wanted_ = tracks; }
   /// Starts tracks at keypoints that no track has. Counts observed tracks and those started.
   void start(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
 

@@ -48,8 +48,9 @@ void add(FrontendStats& sum, const FrontendStats& of_group) {
 
 }  // namespace
 
-RigFrontend::RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends)
-    : groups_(std::move(groups)), frontends_(std::move(frontends)) {}
+RigFrontend::RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<SharingFrontend>> frontends,
+                         int max_features)
+    : groups_(std::move(groups)), frontends_(std::move(frontends)), budget_(max_features, groups_.size()) {}
 
 TrackId RigFrontend::rig_wide(TrackId id, std::size_t group) const {
   return TrackId{id.value * static_cast<std::int64_t>(groups_.size()) + static_cast<std::int64_t>(group)};
@@ -61,7 +62,9 @@ TrackedFrame RigFrontend::process(const SensorPacket& packet, const StatePrior& 
   out.t = packet.frame.t;
   out.imu = packet.imu;
   for (std::size_t k = 0; k < groups_.size(); ++k) {
+    frontends_[k]->follow_at_most(budget_.of(k));
     TrackedFrame frame = frontends_[k]->process(of_group(packet, groups_[k]), prior);
+    budget_.note(k, static_cast<int>(frame.features.size()));
     set_seen(out, groups_[k].first, frame.has_left);
     if (groups_[k].second) set_seen(out, *groups_[k].second, frame.has_right);
     take_features(std::move(frame.features), k, out.features);

@@ -82,10 +82,25 @@ TEST_P(RigFrontendOf, APairWithoutImagesLeavesTheOtherAlone) {
   EXPECT_GT(features_by_camera(frontend_->process(packet(4), {}))[0], 30);
 }
 
+TEST_P(RigFrontendOf, TheFeaturesOfABlindPairAreTheOthers) {
+  FrontendOptions options;
+  options.kind = GetParam();
+  options.klt.max_features = options.orb.max_features = 60;
+  const auto rig = *make_frontend(two_pairs(), options);
+  const auto in_front = [&](int first, int last, bool back) {
+    std::map<int, int> count;
+    for (int k = first; k < last; ++k) count = features_by_camera(rig->process(packet(k, true, back), {}));
+    return count[0];
+  };
+  EXPECT_NEAR(in_front(0, 4, true), 40, 4) << "two thirds of what a pair alone has";
+  EXPECT_NEAR(in_front(4, 28, false), 60, 6) << "all of it";
+  EXPECT_GT(features_by_camera(rig->process(packet(28), {}))[2], 25) << "the blind one takes its share as soon as it sees";
+}
+
 INSTANTIATE_TEST_SUITE_P(All, RigFrontendOf, testing::Values("klt", "orb"));
 
 /// Keeps what it is told.
-struct Listener final : Frontend {
+struct Listener final : SharingFrontend {
   std::vector<LandmarkUpdate>* told;
   explicit Listener(std::vector<LandmarkUpdate>& updates) : told(&updates) {}
   TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
@@ -98,13 +113,14 @@ struct Listener final : Frontend {
     return frame;
   }
   void locate(const LandmarkUpdate& update) override { told->push_back(update); }
+  void follow_at_most(int) override {}
 };
 
 TEST(RigFrontend, APositionGoesToTheFrontendOfItsTrack) {
   std::vector<LandmarkUpdate> told[2];
-  std::vector<std::unique_ptr<Frontend>> frontends;
+  std::vector<std::unique_ptr<SharingFrontend>> frontends;
   for (auto& updates : told) frontends.push_back(std::make_unique<Listener>(updates));
-  RigFrontend rig({{0, 1}, {2, 3}}, std::move(frontends));
+  RigFrontend rig({{0, 1}, {2, 3}}, std::move(frontends), 150);
   const std::vector<TrackedFeature> features = rig.process({}, {}).features;
   ASSERT_EQ(features.size(), 2U);
   EXPECT_NE(features[0].id, features[1].id);

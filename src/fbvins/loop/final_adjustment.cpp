@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "fbvins/loop/adjustment.hpp"
 #include "fbvins/loop/map_front.hpp"
@@ -54,8 +55,11 @@ FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matc
     report.refused = all.error().message;
     return report;
   }
-  Adjustment adjustment(map);
-  for (const FeatureTrack& track : feature_tracks(map, matching, kNeighbours, kMatchRadius_px)) adjustment.add(track);
+  const bool has_scales = std::ranges::any_of(map.sessions, [](const MapSession& s) { return s.log_scale != 0; });
+  const std::optional<PlaceMap> metric = has_scales ? std::optional(in_metres(map)) : std::nullopt;
+  const PlaceMap& measured = metric ? *metric : map;
+  Adjustment adjustment(measured);
+  for (const FeatureTrack& track : feature_tracks(measured, matching, kNeighbours, kMatchRadius_px)) adjustment.add(track);
   if (adjustment.empty()) return report;
   AdjustmentState x = adjustment.start();
   report.iterations = adjustment.solve(x);

@@ -12,6 +12,7 @@ FlightJoin::FlightJoin(const PlaceMap& map) : anchored_(map.anchored), before_(f
     old_.push_back({k.id, k.T_MB, k.loops_ending_here});
     first_session_ = std::max(first_session_, k.session + 1);
   }
+  old_sessions_ = map.sessions;
   for (const MapSession& s : map.sessions) first_session_ = std::max(first_session_, s.number + 1);
 }
 
@@ -39,6 +40,8 @@ PlaceMap FlightJoin::without(PlaceMap kept, const std::set<std::uint32_t>& sessi
     k->loops_ending_here = old.loops_ending_here;
     if (same_M) k->T_MB = old.T_MB;
   }
+  for (const MapSession& old : old_sessions_)
+    if (same_M) kept.session(old.number, old.began).log_scale = old.log_scale;
   const bool some_joined = std::ranges::any_of(kept.keyframes(), [&](const MapKeyframe& k) { return is_of_flight(k.session); });
   if (some_joined) kept.optimise({}, same_M ? first_session_ : 0);
   return kept;

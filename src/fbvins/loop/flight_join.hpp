@@ -43,6 +43,7 @@ class FlightJoin {
   };
 
   std::vector<Old> old_;
+  std::vector<MapSession> old_sessions_;
   bool anchored_ = false;
   std::uint32_t first_session_ = 0;
   PartFit before_;

@@ -67,6 +67,43 @@ struct EdgeCost {
   }
 };
 
+/// An edge in units of which the logarithm in M is `share` s, s being that of a flight's, or the sum of two. What is compared is
+/// in these units: in M's a smaller map would fit better.
+template <int Dof>
+struct ScaledEdgeCost {
+  EdgeCost<Dof> edge;
+  double share;
+
+  template <class T>
+  bool operator()(const T* a, const T* b, const T* s, T* out) const {
+    return evaluate(a, b, s[0], out);
+  }
+  template <class T>
+  bool operator()(const T* a, const T* b, const T* s, const T* s_too, T* out) const {
+    return evaluate(a, b, T(s[0] + s_too[0]), out);
+  }
+
+  template <class T>
+  bool evaluate(const T* a, const T* b, const T& log_scale, T* out) const {
+    using std::exp;
+    const T units = exp(log_scale * T(-share));
+    T from[Dof], to[Dof];
+    for (int i = 0; i < Dof; ++i) from[i] = i < 3 ? T(0) : a[i], to[i] = i < 3 ? T(units * (b[i] - a[i])) : b[i];
+    return edge(from, to, out);
+  }
+};
+
+/// What a flight says of its scale by itself.
+struct ScaleCost {
+  double per_sigma;
+
+  template <class T>
+  bool operator()(const T* log_scale, T* out) const {
+    out[0] = log_scale[0] * per_sigma;
+    return true;
+  }
+};
+
 /// A measurement of a node by itself.
 template <int Dof>
 struct AnchorCost {

@@ -119,8 +119,9 @@ void LoopCloser::advance(const Keyframe& keyframe) {
   session_.gauge = keyframe.gauge;
   motion_.add(keyframe);
   drift_.take(keyframe.pose_covariance, keyframe.gauge, session_.path_m);
-  frame_.advance(T_GB, keyframe.t, drift_.rate());
+  frame_.advance(T_GB, keyframe.t, drift_.rate(), session_.began_map ? 0 : keyframe.scale_sigma);
   vertical_.advance(drift_over(drift_.rate(), step_m, 0).yaw_rad2);
+  session_.scale.add(keyframe.scale_sigma);
   const MapKeyframe* newest = map_.find(session_.newest);
   session_.readings.add(keyframe.imu.segments, keyframe.t, newest ? std::optional(newest->t) : std::nullopt);
 }
@@ -186,6 +187,15 @@ std::vector<KeyframeId> LoopCloser::candidates_for(const MapKeyframe& query) {
   return frame_.known() ? search_.around(map_, query, position_sigma_m(frame_.covariance())) : search_.anywhere(map_, query);
 }
 
+/// Whether the flight's lengths are not those of the map, which it did not begin.
+bool LoopCloser::needs_scale() const { return !session_.began_map && session_.scale.sigma() > 0; }
+
+/// Length in M of what the flight and this keyframe measure together as 1 m.
+double LoopCloser::metres_with(const MapKeyframe& k) const {
+  const double log = frame_.log_scale() + map_.log_scale_of(k.session);
+  return log == 0 ? 1 : std::exp(0.5 * log);
+}
+
 std::vector<LoopCloser::Proposal> LoopCloser::look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates) {
   std::vector<Proposal> proposals;
   if (candidates.empty()) return proposals;
@@ -216,8 +226,8 @@ bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
-  if (k.session == session_.number) seen.covariance *= kSharedError;
-  else vertical_.add(*session_.gauge, seen);
+  if (k.session != session_.number) vertical_.add(*session_.gauge, seen);
+  if (k.session == session_.number || needs_scale()) seen.covariance *= kSharedError;
   frame_.update(seen);
   return true;
 }
@@ -226,7 +236,10 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
                        std::vector<MapEdge>& found) {
   for (const Proposal& proposal : proposals) {
     MapKeyframe& k = *map_.find(proposal.candidate);
-    if (!take(k, measured_pose(k, proposal.edge))) {
+    const MeasuredPose seen = measured_pose(k, proposal.edge, metres_with(k));
+    if (take(k, seen)) {
+      session_.confirmed = true;
+    } else if (!find_again(query, proposal, seen)) {
       ++update.stats.refused;
       join_.note_refused(session_.number, 1);
       continue;
@@ -238,6 +251,15 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
   query.T_MB = frame_.T_MG() * query.T_GB;
 }
 
+/// The first places that a flight of one camera recognises have depths of a poor scale, and so has where they put it. Until a
+/// place confirms that, others may find it anew.
+bool LoopCloser::find_again(MapKeyframe& query, const Proposal& proposal, const MeasuredPose& seen) {
+  if (session_.confirmed || !needs_scale()) return false;
+  const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
+  if (T_MG) found_at(*T_MG, seen);
+  return T_MG.has_value();
+}
+
 void LoopCloser::found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen) {
   frame_.reset(T_MG, kFoundSigma_m, kFoundSigma_rad);
   frame_.update(seen);
@@ -247,7 +269,8 @@ void LoopCloser::found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen) {
 
 void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found) {
   for (const Proposal& proposal : proposals) {
-    const MeasuredPose seen = measured_pose(*map_.find(proposal.candidate), proposal.edge);
+    const MapKeyframe& k = *map_.find(proposal.candidate);
+    const MeasuredPose seen = measured_pose(k, proposal.edge, metres_with(k));
     const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
     if (!T_MG) continue;
     found_at(*T_MG, seen);
@@ -278,6 +301,7 @@ void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vecto
   const BowVector words = query.place.words;
   MapSession& session = map_.session(session_.number, t);
   session.ended = t;
+  session.scale_sigma = session_.scale.sigma();
   ++session.keyframes;
   session.loops += static_cast<int>(
       std::ranges::count_if(found, [&](const MapEdge& e) { return map_.find(e.from)->session != session_.number; }));
@@ -321,6 +345,7 @@ void LoopCloser::optimise(MapUpdate& update) {
   if (const MapKeyframe* newest = map_.find(session_.newest); newest != nullptr && frame_.known()) {
     const Mat4 P = frame_.covariance();
     frame_.reset(newest->T_MB * newest->T_GB.inverse(), std::sqrt(P.topLeftCorner<3, 3>().trace() / 3), std::sqrt(P(3, 3)));
+    if (!session_.began_map) frame_.set_log_scale(map_.log_scale_of(session_.number));
   }
   update.stats.optimised = true;
   for (const MapKeyframe& k : map_.keyframes()) update.corrected.push_back({k.id, k.t, k.T_MB});

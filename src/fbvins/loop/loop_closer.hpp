@@ -21,6 +21,7 @@
 #include "fbvins/loop/candidate_search.hpp"
 #include "fbvins/loop/flight_join.hpp"
 #include "fbvins/loop/flight_keyframes.hpp"
+#include "fbvins/loop/flight_scale.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_frame.hpp"
 #include "fbvins/loop/odometry_drift.hpp"
@@ -73,6 +74,7 @@ class LoopCloser final : public Mapper {
     std::uint32_t reset_counter = 0;
     bool began_map = false;  ///< M is its gauge, aligned with gravity
     bool localised = false;
+    bool confirmed = false;        ///< a place was where it is expected to be since the flight was found in an older map
     Quat q_LG = Quat::Identity();  ///< by which M, or the flight in an older one, is level
     Quat q_LG_newest = Quat::Identity();
     double up_sigma_rad = 0;  ///< of the vertical, by gravity and places
@@ -80,6 +82,7 @@ class LoopCloser final : public Mapper {
     std::optional<GaugeState> gauge = {};  ///< of the last keyframe that was handed in
     double path_m = 0;
     ReadingsSince readings = {};  ///< the newest keyframe of the map
+    FlightScale scale = {};
   };
   struct Proposal {
     KeyframeId candidate;
@@ -97,9 +100,12 @@ class LoopCloser final : public Mapper {
   void advance(const Keyframe& keyframe);
   MapKeyframe query_of(Place place, const Keyframe& keyframe);
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
+  bool needs_scale() const;
+  double metres_with(const MapKeyframe& k) const;
   std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
   void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
   bool take(const MapKeyframe& k, MeasuredPose seen);
+  bool find_again(MapKeyframe& query, const Proposal& proposal, const MeasuredPose& seen);
   void found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
   void join_session(const Pose<M, G>& T_MG);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace fbvins {
@@ -17,6 +18,8 @@ constexpr int kLeastTies = 3;
 /// not fit as well as before; beyond that a factor of the value before.
 constexpr double kStepsFit = 4, kRestFits = 1, kWorse = 1.3;
 constexpr double kRows = 6;
+/// In standard deviations, of a flight of one camera.
+constexpr double kScaleFits = 5;
 
 }  // namespace
 
@@ -38,6 +41,8 @@ PartFit fit_of(const PlaceMap& map, const InPart& in_part) {
   fit.tied_keyframes = static_cast<int>(tied.size());
   fit.steps = steps / (kRows * std::max(1, steps_count));
   fit.rest = rest / (kRows * std::max(1, rest_count));
+  for (const MapSession& s : map.sessions)
+    if (in_part(s.number) && s.scale_sigma > 0) fit.scale = std::max(fit.scale, std::abs(s.log_scale) / s.scale_sigma);
   fit.anchored = map.anchored &&
                  std::ranges::any_of(map.anchors, [&](const MapAnchor& a) { return in_part(map.find(a.keyframe)->session); });
   return fit;
@@ -52,6 +57,8 @@ std::string objection(const PartFit& before, const PartFit& after, int refused) 
   if (after.steps > std::max(kStepsFit, kWorse * before.steps))
     return fmt::format("its odometry does not fit the places it recognised: {:.1f} squared standard deviations of a step",
                        after.steps);
+  if (after.scale > kScaleFits)
+    return fmt::format("its scale does not fit the places it recognised: it is off by {:.1f} standard deviations", after.scale);
   if (after.rest > std::max(kRestFits, kWorse * before.rest))
     return fmt::format("it bends the map: its measurements fit worse than before, {:.2f} -> {:.2f} squared standard deviations",
                        before.rest, after.rest);

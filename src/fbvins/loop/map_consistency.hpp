@@ -24,6 +24,7 @@ struct PartFit {
   bool anchored = false;   ///< the part has anchors in an anchored map
   /// Mean squared residual in standard deviations: of the odometry's steps in the part; of all measurements in the rest that fit.
   double steps = 0, rest = 0;
+  double scale = 0;  ///< how far the scale of its flights is off, in its standard deviations
 };
 
 PartFit fit_of(const PlaceMap& map, const InPart& in_part);

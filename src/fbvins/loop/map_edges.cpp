@@ -48,9 +48,9 @@ MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const Relative
   return {candidate, {}, T_BC * T_cq * T_BC.inverse(), symmetric(cov.inverse()), MapEdge::Kind::loop, nullptr};
 }
 
-MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge) {
+MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge, double metre) {
   MeasuredPose seen;
-  seen.T_MB = from.T_MB * edge.T_from_to;
+  seen.T_MB = from.T_MB * Pose<B, B>(edge.T_from_to.q, Vec3(metre * edge.T_from_to.p));
   const Mat6 cov = edge.information.inverse();
   const Mat3 R = from.T_MB.R(), R_q = seen.T_MB.R();
   // Position in M and the rotation's part about M's z.

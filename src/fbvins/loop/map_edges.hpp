@@ -21,7 +21,7 @@ MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, c
 /// From the candidate to the query's body; `to` is left open. `pose`: of the candidate's camera in the query's.
 MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose);
 
-/// Pose in M of the body at the end of `edge`, from that of `from`.
-MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge);
+/// Pose in M of the body at the end of `edge`, whose metre has this length in M, from that of `from`.
+MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge, double metre = 1);
 
 }  // namespace fbvins

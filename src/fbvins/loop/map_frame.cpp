@@ -14,6 +14,9 @@ namespace {
 /// What an odometry at rest drifts in a second, as standard deviations that grow with the root of time.
 constexpr double kStandstill_m = 0.001, kStandstillYaw_rad = 0.01 * kDegree;
 
+/// Way over which the error of a scale becomes another one: the landmarks of one window are left behind.
+constexpr double kSameScale_m = 8;
+
 /// The pose with this orientation that takes the body at `p` to p_MB.
 template <class From>
 Pose<M, From> frame_at(const Quat& q, const Vec3& p_MB, const Vec3& p) {
@@ -62,19 +65,37 @@ void MapFrame::level(const Quat& q_LG) {
 void MapFrame::reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad) {
   put(yaw_of(T_MG.q * q_LG_.conjugate()), T_MG * body());
   P_ = Vec4(sigma_m * sigma_m, sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
+  scale_.with.setZero();
   known_ = true;
 }
 
-void MapFrame::advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& rate) {
+/// (L34) With sigma zero nothing changes.
+void MapFrame::advance_scale(const Vec3& step_M, const Mat4& F, double sigma) {
+  if (sigma <= 0) return;
+  const double variance = sigma * sigma, stays = std::exp(-step_M.norm() / kSameScale_m);
+  if (scale_.variance == 0) scale_.variance = variance;
+  Vec4 by = Vec4::Zero();
+  by.head<3>() = step_M;
+  const Vec4 carried = F * scale_.with;
+  P_ += carried * by.transpose() + by * carried.transpose() + scale_.variance * by * by.transpose();
+  scale_.with = stays * (carried + scale_.variance * by);
+  scale_.variance = stays * stays * scale_.variance + (1 - stays * stays) * variance;
+}
+
+void MapFrame::advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& rate, double scale_sigma) {
+  Vec3 longer = Vec3::Zero();
   if (last_ && known_) {
     const Vec3 step = T_GB.p - last_->T_GB.p;
     const DriftVariance drift = drift_over(rate, step.norm(), std::abs((t - last_->t).seconds()));
     Mat4 F = Mat4::Identity();  // a yaw error turns the step
     F.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MG_.q * step);
     P_ = F * P_ * F.transpose();
+    longer = (std::exp(scale_.log) - 1) * (T_MG_.q * step);
+    advance_scale(T_MG_.q * step, F, scale_sigma);
     P_.diagonal() += Vec4(drift.position_m2, drift.position_m2, drift.position_m2, drift.yaw_rad2);
   }
   last_ = Stamped{t, T_GB};
+  if (scale_.log != 0) put(yaw_rad_, T_MG_ * body() + longer);
 }
 
 Vec4 MapFrame::innovation(const MeasuredPose& seen) const {
@@ -96,6 +117,12 @@ void MapFrame::update(const MeasuredPose& seen) {
   const Vec4 d = K * v;
   const Mat4 A = Mat4::Identity() - K;
   P_ = A * P_ * A.transpose() + K * seen.covariance * K.transpose();
+  if (scale_.variance > 0) {
+    const Vec4 gain = S.ldlt().solve(scale_.with);
+    scale_.log += gain.dot(v);
+    scale_.variance -= gain.dot(scale_.with);
+    scale_.with = A * scale_.with;
+  }
   put(yaw_rad_ + d[3], T_MG_ * body() + d.head<3>());
 }
 
@@ -122,6 +149,12 @@ void MapFrame::update(const PartialPose& seen, const Pose<G, B>& T_GB) {
   const Vec4 d = K * v;
   const Mat4 remains = Mat4::Identity() - K * H;
   P_ = remains * P_ * remains.transpose() + K * K.transpose();
+  if (scale_.variance > 0) {
+    const Vec6 gain = S.ldlt().solve(H * scale_.with);
+    scale_.log += gain.dot(v);
+    scale_.variance -= gain.dot(H * scale_.with);
+    scale_.with = remains * scale_.with;
+  }
   put(yaw_rad_ + d[3], T_MG_ * body() + d.head<3>());
 }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The present pose of a flight's gauge G in the map M: a Kalman filter over position and yaw of the body in M, predicted with
 // the odometry's drift and updated by recognised places (docs/derivations/loop.md, L12-L14); its tilt is not filtered but
-// the flight's own estimate of gravity. Where M is the frame of anchors, they update it as well (L23). And a follower of T_MW of
-// limited speed, for controllers that fly in M. Values; one thread at a time.
+// the flight's own estimate of gravity. Of a flight of one camera it estimates the scale as well (L34). Where M is the frame of
+// anchors, they update it as well (L23). And a follower of T_MW of limited speed, for controllers that fly in M. Values; one
+// thread at a time.
 //
 //   MapFrame frame;
 //   frame.level(q_LG);
@@ -56,7 +57,7 @@ class MapFrame {
   /// Of the body's position in M [m] and the yaw of G in M [rad].
   const Mat4& covariance() const { return P_; }
 
-  void forget() { known_ = false, last_.reset(); }
+  void forget() { known_ = false, last_.reset(), scale_ = {}; }
   /// Takes a new estimate of q_LG, which turns G level: the body stays where it is in M, and so does the yaw.
   void level(const Quat& q_LG);
   /// Of roll and pitch of G in M, where an anchor is taken for what they change in it.
@@ -66,8 +67,13 @@ class MapFrame {
   /// Sets the frame, with standard deviations of position and of yaw. Of T_MG only the yaw and where it puts the body are
   /// kept: its tilt follows from q_LG.
   void reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad);
-  /// Predicts: the odometry's next pose, and how fast it drifts.
-  void advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& drift);
+  /// Predicts: the odometry's next pose, how fast it drifts, and the relative standard deviation of its lengths; 0: it measures
+  /// them.
+  void advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& drift, double scale_sigma = 0);
+  /// Logarithm of the length in M of a metre of the odometry.
+  double log_scale() const { return scale_.log; }
+  /// A graph has found it, with everything that reset() is told.
+  void set_log_scale(double log) { scale_.log = log; }
   double mahalanobis2(const MeasuredPose& seen) const;
   void update(const MeasuredPose& seen);
   /// The same for an anchor that measures the body at `T_GB`, which may be an earlier pose; M is the anchors' frame.
@@ -84,6 +90,12 @@ class MapFrame {
     Vec6 v;
     Eigen::Matrix<double, 6, 4> H;
   };
+  /// Of the odometry in M, with the covariance to the other states.
+  struct Scale {
+    double log = 0, variance = 0;
+    Vec4 with = Vec4::Zero();
+  };
+  void advance_scale(const Vec3& step_M, const Mat4& F, double sigma);
   Whitened innovation(const PartialPose& seen, const Pose<G, B>& T_GB) const;
   Vec4 innovation(const MeasuredPose& seen) const;
   /// Where the body is in G; its origin before the odometry has begun.
@@ -95,6 +107,7 @@ class MapFrame {
   double yaw_rad_ = 0, tilt_rad_ = kTilt_rad;
   Pose<M, G> T_MG_;
   Mat4 P_ = Mat4::Zero();
+  Scale scale_;
   std::optional<Stamped> last_;
 };
 

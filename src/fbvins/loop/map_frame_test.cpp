@@ -74,6 +74,43 @@ TEST(MapFrame, FlyingWidensTheCovarianceAndAPlaceNarrowsIt) {
   EXPECT_LT(p.y(), 0.05);
 }
 
+/// Flies along x, a metre at a time, by an odometry whose metre is `metre` long; a place is known every third time.
+MapFrame after_flight(double metre, double sigma, int metres) {
+  MapFrame frame;
+  frame.advance(body_at(Vec3::Zero()), Time{0}, {}, sigma);
+  frame.reset({}, 0.01, 0.001);
+  for (int i = 1; i <= metres; ++i) {
+    frame.advance(body_at(Vec3(i, 0, 0)), Time{1'000'000'000LL * i}, {}, sigma);
+    if (i % 3 != 0) continue;
+    const MeasuredPose seen{{Quat::Identity(), Vec3(metre * i, 0, 0)}, 1e-4 * Mat4::Identity()};
+    EXPECT_LT(frame.mahalanobis2(seen), 25) << i;
+    frame.update(seen);
+  }
+  return frame;
+}
+
+TEST(MapFrame, LearnsTheScaleOfAFlightOfOneCamera) {
+  MapFrame frame = after_flight(1.08, 0.05, 12);
+  EXPECT_NEAR(frame.log_scale(), std::log(1.08), 0.01);
+  frame.advance(body_at(Vec3(14, 0, 0)), Time{14'000'000'000}, {}, 0.05);
+  EXPECT_NEAR((frame.T_MG() * Vec3(14, 0, 0)).x(), 1.08 * 14, 0.03);
+  frame.forget();
+  EXPECT_EQ(frame.log_scale(), 0);
+}
+
+TEST(MapFrame, AnUncertainScaleWidensAlongTheWay) {
+  const auto after = [](double sigma) {
+    MapFrame frame;
+    frame.advance(body_at(Vec3::Zero()), Time{0}, {}, sigma);
+    frame.reset({}, 0.01, 0.001);
+    for (int i = 1; i <= 4; ++i) frame.advance(body_at(Vec3(0.5 * i, 0, 0)), Time{1'000'000'000LL * i}, {}, sigma);
+    return frame.covariance();
+  };
+  const Mat4 more = after(0.05) - after(0);
+  EXPECT_NEAR(std::sqrt(more(0, 0)), 0.05 * 2, 0.01);
+  EXPECT_LT((more.bottomRightCorner<3, 3>().norm()), 1e-12);
+}
+
 TEST(MapFrame, MahalanobisIsOneAtOneStandardDeviation) {
   MapFrame frame;
   frame.advance(body_at(Vec3::Zero()), Time{0}, {});

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
 #include <set>
 #include <span>
 
@@ -14,6 +16,7 @@ namespace {
 
 static_assert(sizeof(PlaceFeature) == 20 && sizeof(Descriptor) == 32 && sizeof(BowEntry) == 8);
 constexpr std::size_t kLongestName = 200;
+constexpr double kLargestScale = 2;  // as a logarithm, and as a standard deviation
 
 void put_information(BytesOut& out, const Mat6& information) {
   for (int i = 0; i < 6; ++i)
@@ -101,7 +104,12 @@ std::vector<MapSession> remembered(const PlaceMap& map) {
   return out;
 }
 
+bool have_scales(const std::vector<MapSession>& sessions) {
+  return std::ranges::any_of(sessions, [](const MapSession& s) { return s.scale_sigma > 0; });
+}
+
 void put_sessions(BytesOut& out, const std::vector<MapSession>& sessions) {
+  const bool scales = have_scales(sessions);
   out.put(static_cast<std::uint32_t>(sessions.size()));
   for (const MapSession& s : sessions) {
     out.put(s.number);
@@ -109,12 +117,13 @@ void put_sessions(BytesOut& out, const std::vector<MapSession>& sessions) {
     out.put(s.ended.ns);
     out.put(static_cast<std::int32_t>(s.keyframes));
     out.put(static_cast<std::int32_t>(s.loops));
+    if (scales) out.put(s.scale_sigma), out.put(s.log_scale);
   }
 }
 
-void get_sessions(BytesIn& in, PlaceMap& map) {
+void get_sessions(BytesIn& in, bool scales, PlaceMap& map) {
   const auto sessions = in.get<std::uint32_t>();
-  in.check(sessions > 1);
+  in.check(sessions > (scales ? 0 : 1));
   for (std::uint32_t i = 0; i < sessions && in.ok(); ++i) {
     MapSession s;
     s.number = in.get<std::uint32_t>();
@@ -122,6 +131,8 @@ void get_sessions(BytesIn& in, PlaceMap& map) {
     s.ended.ns = in.get<std::int64_t>();
     s.keyframes = in.get<std::int32_t>();
     s.loops = in.get<std::int32_t>();
+    if (scales) s.scale_sigma = in.get<double>(), s.log_scale = in.get<double>();
+    in.check(s.scale_sigma >= 0 && s.scale_sigma < kLargestScale && std::abs(s.log_scale) < kLargestScale);
     in.check(map.sessions.empty() || s.number > map.sessions.back().number);
     map.sessions.push_back(s);
   }
@@ -208,13 +219,14 @@ MapRest rest_of(const PlaceMap& map) {
   for (const MapTag& t : map.tags)
     if (kept.count(t.keyframe) > 0) rest.tags.push_back(&t);
   rest.sessions = remembered(map);
-  if (rest.sessions.size() == 1) rest.sessions.clear();
+  if (rest.sessions.size() == 1 && !have_scales(rest.sessions)) rest.sessions.clear();
   return rest;
 }
 
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest) {
   return (map.boosted ? kMapBoosted : 0) | (rest.name.empty() ? 0 : kMapNamed) | (rest.anchors.empty() ? 0 : kMapAnchors) |
-         (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory) | (rest.tags.empty() ? 0 : kMapTags);
+         (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory) | (rest.tags.empty() ? 0 : kMapTags) |
+         (have_scales(rest.sessions) ? kMapScales : 0);
 }
 
 void put_rest(BytesOut& out, const MapRest& rest) {
@@ -252,7 +264,7 @@ void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& m
     in.check(map.find(a.keyframe) != nullptr);
     if (in.ok()) map.anchors.push_back(a);
   }
-  if (in.ok() && (flags & kMapMemory) != 0) get_sessions(in, map);
+  if (in.ok() && (flags & kMapMemory) != 0) get_sessions(in, (flags & kMapScales) != 0, map);
   const std::uint32_t tags = in.ok() && (flags & kMapTags) != 0 ? in.get<std::uint32_t>() : 0;
   in.check(tags > 0 || (flags & kMapTags) == 0);
   for (std::uint32_t i = 0; i < tags && in.ok(); ++i) {

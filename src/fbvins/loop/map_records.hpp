@@ -25,9 +25,11 @@ std::uint64_t map_checksum(std::string_view bytes);
 Error damaged_map(const std::string& name, std::string_view what);
 
 /// Flags: descriptors are boosted; a name follows the edges, and anchors follow it; M is their frame; what is remembered of
-/// sessions comes then, and tags that are landmarks.
-inline constexpr std::uint32_t kMapBoosted = 1, kMapNamed = 2, kMapAnchors = 4, kMapAnchored = 8, kMapMemory = 16, kMapTags = 32;
-inline constexpr std::uint32_t kMapFlags = kMapBoosted | kMapNamed | kMapAnchors | kMapAnchored | kMapMemory | kMapTags;
+/// sessions comes then, and tags that are landmarks; of sessions their scales are remembered.
+inline constexpr std::uint32_t kMapBoosted = 1, kMapNamed = 2, kMapAnchors = 4, kMapAnchored = 8, kMapMemory = 16, kMapTags = 32,
+                               kMapScales = 64;
+inline constexpr std::uint32_t kMapFlags =
+    kMapBoosted | kMapNamed | kMapAnchors | kMapAnchored | kMapMemory | kMapTags | kMapScales;
 
 /// Bytes of a feature with its descriptor.
 inline constexpr std::size_t kFeatureBytes = sizeof(PlaceFeature) + sizeof(Descriptor);
@@ -48,7 +50,7 @@ struct MapRest {
   std::string name;
   std::vector<const MapAnchor*> anchors;
   std::vector<const MapTag*> tags;
-  std::vector<MapSession> sessions;  ///< none where there is one only, which its keyframes show
+  std::vector<MapSession> sessions;  ///< none where there is one only, which its keyframes show, and that is metric
 };
 MapRest rest_of(const PlaceMap& map);
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest);

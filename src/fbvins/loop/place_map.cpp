@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "fbvins/imu/preintegration.hpp"
 #include "fbvins/loop/map_tags.hpp"
@@ -14,6 +15,8 @@ namespace {
 constexpr std::size_t kMostAnchors = 5000;
 /// Differences of two rigs' bodies (m and rad together) below this are rounding errors.
 constexpr double kSameBody = 1e-9;
+/// Beyond this a scale is no error of an odometry.
+constexpr double kLargestLogScale = 0.5;
 
 template <class Keyframes>
 auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {
@@ -181,16 +184,35 @@ std::vector<bool> PlaceMap::in_graph() const {
   return joined;
 }
 
-PoseGraphEdge PlaceMap::edge_of(const MapEdge& e) const {
-  return {index_of(e.from), index_of(e.to), e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1};
+/// Scales of the sessions whose unit is uncertain, by their number. Those before `first` stay.
+PlaceMap::Scales PlaceMap::add_scales(PoseGraph& graph, std::uint32_t first) const {
+  Scales scales;
+  for (const MapSession& s : sessions)
+    if (s.scale_sigma > 0) scales.emplace(s.number, graph.add_scale({s.log_scale, s.scale_sigma, s.number < first}));
+  return scales;
+}
+
+PoseGraphEdge PlaceMap::edge_of(const MapEdge& e, const Scales& scales) const {
+  const auto scale_of = [&](KeyframeId id) {
+    const auto scale = scales.empty() ? scales.end() : scales.find(find(id)->session);
+    return scale == scales.end() ? std::nullopt : std::optional(scale->second);
+  };
+  return {index_of(e.from), index_of(e.to), e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1,
+          scale_of(e.from), scale_of(e.to)};
+}
+
+double PlaceMap::log_scale_of(std::uint32_t number) const {
+  const auto s = std::ranges::find(sessions, number, &MapSession::number);
+  return s == sessions.end() ? 0 : s->log_scale;
 }
 
 std::vector<double> PlaceMap::chi2_of_edges(const PoseGraphOptions& options) const {
   PoseGraph graph;
   for (const MapKeyframe& k : keyframes_) graph.add_node(k.T_MB, T_BC0.q * k.place.up_C0);
+  const Scales scales = add_scales(graph, 0);
   std::vector<double> all;
   all.reserve(edges.size());
-  for (const MapEdge& e : edges) all.push_back(graph.chi2(edge_of(e), options));
+  for (const MapEdge& e : edges) all.push_back(graph.chi2(edge_of(e, scales), options));
   return all;
 }
 
@@ -208,8 +230,10 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options, std::uint32_
   for (std::size_t i = 0; i < keyframes_.size(); ++i) moves[i] = moves[i] && keyframes_[i].session >= first;
   for (std::size_t i = 0; i < keyframes_.size(); ++i)
     graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, !moves[i] || (i == 0 && !anchored));
+  // Nothing but other flights, or anchors, says anything of a flight's scale.
+  const Scales scales = sessions.size() > 1 || anchored ? add_scales(graph, first) : Scales{};
   for (const MapEdge& e : edges)
-    if (may_move(e.from) || may_move(e.to)) graph.add_edge(edge_of(e));
+    if (may_move(e.from) || may_move(e.to)) graph.add_edge(edge_of(e, scales));
   if (anchored) {
     for (const MapAnchor& a : anchors)
       if (may_move(a.keyframe)) graph.add_anchor({index_of(a.keyframe), a.measured});
@@ -219,6 +243,9 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options, std::uint32_
   }
   const PoseGraphReport report = graph.optimise(options);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) keyframes_[i].T_MB = graph.poses()[i];
+  for (MapSession& s : sessions)
+    if (const auto scale = scales.find(s.number); scale != scales.end())
+      s.log_scale = std::clamp(graph.scales()[scale->second].log, -kLargestLogScale, kLargestLogScale);
   return report;
 }
 
@@ -238,6 +265,26 @@ void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0) {
   }
   for (MapAnchor& a : map.anchors) a.measured = carried(a.measured, T_new_old, Mat6::Zero());
   for (MapTag& t : map.tags) t = carried(t, t.keyframe, T_new_old, Mat6::Zero());
+}
+
+PlaceMap in_metres(PlaceMap map) {
+  for (MapEdge& e : map.edges) {
+    const double logs = map.log_scale_of(map.find(e.from)->session) + map.log_scale_of(map.find(e.to)->session);
+    const double metre = std::exp(0.5 * logs);
+    e.T_from_to.p *= metre;
+    e.information.topRows<3>() /= metre;
+    e.information.leftCols<3>() /= metre;
+  }
+  for (MapKeyframe& k : map.keyframes()) {
+    const double metre = std::exp(map.log_scale_of(k.session));
+    k.motion.v_GB *= metre;
+    for (PlaceFeature& f : k.place.features) {
+      f.inverse_depth /= static_cast<float>(metre);
+      f.sigma_inverse_depth /= static_cast<float>(metre);
+    }
+  }
+  for (MapSession& s : map.sessions) s.log_scale = 0;
+  return map;
 }
 
 }  // namespace fbvins

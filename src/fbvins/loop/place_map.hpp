@@ -8,6 +8,7 @@
 //   map.edges.push_back({older, id, T_ab, information, MapEdge::Kind::loop});
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -78,6 +79,9 @@ struct MapSession {
   Time began, ended;  ///< stamps of its first and last keyframe, of its sensors' clock
   int keyframes = 0;  ///< that it brought
   int loops = 0;      ///< that it closed with other sessions
+  /// Of one camera: how uncertain its unit of length is, relatively, by itself; 0: its cameras measured lengths.
+  double scale_sigma = 0;
+  double log_scale = 0;  ///< logarithm of its unit in M, by the graph
 };
 
 /// What a map's file says of it, which a journal beside the file builds on.
@@ -131,6 +135,8 @@ class PlaceMap {
 
   /// What is remembered of a session; made where nothing is.
   MapSession& session(std::uint32_t number, Time t);
+  /// Logarithm of the length in M of a session's metre; 0 where nothing is known of it.
+  double log_scale_of(std::uint32_t session) const;
 
   std::vector<MapEdge> edges;
   std::vector<MapAnchor> anchors;
@@ -147,7 +153,9 @@ class PlaceMap {
 
  private:
   std::vector<bool> in_graph() const;
-  PoseGraphEdge edge_of(const MapEdge& e) const;
+  using Scales = std::map<std::uint32_t, std::size_t>;  ///< of a session, in a graph
+  Scales add_scales(PoseGraph& graph, std::uint32_t first) const;
+  PoseGraphEdge edge_of(const MapEdge& e, const Scales& scales) const;
   int index_of(KeyframeId id) const { return static_cast<int>(find(id) - keyframes_.data()); }
 
   std::vector<MapKeyframe> keyframes_;
@@ -156,6 +164,9 @@ class PlaceMap {
 
 /// Makes the body that of another rig whose camera is the same: the camera's poses stay.
 void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0);
+
+/// With the lengths of flights of one camera in metres of M: of their steps, loops and places, which must be in memory.
+PlaceMap in_metres(PlaceMap map);
 
 /// Covariance of A * B from those of A and B, each of (dp in its left frame, dtheta in its right one).
 Mat6 compose_covariance(const Pose<B, B>& T_ab, const Mat6& cov_ab, const Pose<B, B>& T_bc, const Mat6& cov_bc);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The vertical of an older map in the gauge of a flight, as the places say that are recognised, and combined with gravity, which
-// a flight knows to a degree or two in its first seconds (docs/derivations/loop.md, L33). A value; one thread at a time.
+// a flight knows to a degree or two in its first seconds (docs/derivations/loop.md, L35). A value; one thread at a time.
 //
 //   PlaceVertical vertical;
 //   vertical.advance(drift_rad2);                          // every keyframe

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "fbvins/loop/graph_costs.hpp"
 
@@ -25,12 +26,23 @@ constexpr double kMinWeight = 1e-6;
 
 template <int Dof>
 void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& information, const std::vector<Pose<M, B>>& poses,
-              std::vector<std::array<double, 6>>& x) {
+              std::vector<std::array<double, 6>>& x, std::vector<PoseGraphScale>& scales) {
   const auto a = static_cast<std::size_t>(e.a), b = static_cast<std::size_t>(e.b);
   const Mat6 root = Eigen::LLT<Mat6>(information).matrixU();
-  auto* cost =
-      new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>{poses[a].q, poses[b].q, e.T_ab, root});
-  problem.AddResidualBlock(cost, nullptr, x[a].data(), x[b].data());
+  const EdgeCost<Dof> edge{poses[a].q, poses[b].q, e.T_ab, root};
+  using Cost = ScaledEdgeCost<Dof>;
+  double *const xa = x[a].data(), *const xb = x[b].data();
+  if (!e.scale_a && !e.scale_b) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>(edge)), nullptr, xa,
+                             xb);
+  } else if (e.scale_a && e.scale_b && *e.scale_a != *e.scale_b) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Cost, 6, Dof, Dof, 1, 1>(new Cost{edge, 0.5}), nullptr, xa, xb,
+                             &scales[*e.scale_a].log, &scales[*e.scale_b].log);
+  } else {
+    const double share = e.scale_a && e.scale_b ? 1 : 0.5;
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Cost, 6, Dof, Dof, 1>(new Cost{edge, share}), nullptr, xa, xb,
+                             &scales[e.scale_a ? *e.scale_a : *e.scale_b].log);
+  }
 }
 
 template <int Dof>
@@ -69,8 +81,16 @@ int PoseGraph::add_node(const Pose<M, B>& T_MB, const Vec3& up_B, bool fixed) {
 double PoseGraph::chi2(const PoseGraphEdge& edge, const PoseGraphOptions& options) const {
   PoseGraphEdge e = edge;
   e.weight = 1;
-  const Vec6 r = edge_residual(poses_[static_cast<std::size_t>(e.a)], poses_[static_cast<std::size_t>(e.b)], e.T_ab);
+  const Vec6 r = residual_of(e);
   return r.dot(weighted_information(e, options) * r);
+}
+
+/// At the present poses and scales, in the units of the edge: what two flights see together has a length between theirs.
+Vec6 PoseGraph::residual_of(const PoseGraphEdge& e) const {
+  const Pose<M, B>&a = poses_[static_cast<std::size_t>(e.a)], &b = poses_[static_cast<std::size_t>(e.b)];
+  if (!e.scale_a && !e.scale_b) return edge_residual(a, b, e.T_ab);
+  const double log_a = e.scale_a ? scales_[*e.scale_a].log : 0, log_b = e.scale_b ? scales_[*e.scale_b].log : 0;
+  return edge_residual({a.q, Vec3::Zero()}, {b.q, Vec3(std::exp(-0.5 * (log_a + log_b)) * (b.p - a.p))}, e.T_ab);
 }
 
 /// With four degrees of freedom a node cannot tilt: the error of the odometry's roll and pitch is added to the covariance of
@@ -105,14 +125,19 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
   std::vector<bool> used(poses_.size(), false);
   for (std::size_t i = 0; i < poses_.size(); ++i) x[i] = {poses_[i].p.x(), poses_[i].p.y(), poses_[i].p.z(), 0, 0, 0};
   for (const PoseGraphEdge& e : edges_) {
-    if (options.degrees_of_freedom == 4) add_cost<4>(problem, e, weighted_information(e, options), poses_, x);
-    else add_cost<6>(problem, e, weighted_information(e, options), poses_, x);
+    if (options.degrees_of_freedom == 4) add_cost<4>(problem, e, weighted_information(e, options), poses_, x, scales_);
+    else add_cost<6>(problem, e, weighted_information(e, options), poses_, x, scales_);
     used[static_cast<std::size_t>(e.a)] = used[static_cast<std::size_t>(e.b)] = true;
   }
   for (const PoseGraphAnchor& a : anchors_) {
     if (options.degrees_of_freedom == 4) add_cost<4>(problem, a, poses_, x);
     else add_cost<6>(problem, a, poses_, x);
     used[static_cast<std::size_t>(a.node)] = true;
+  }
+  for (PoseGraphScale& s : scales_) {
+    if (!problem.HasParameterBlock(&s.log)) continue;
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ScaleCost, 1, 1>(new ScaleCost{1 / s.sigma}), nullptr, &s.log);
+    if (s.fixed) problem.SetParameterBlockConstant(&s.log);
   }
   const double per_sigma = 1 / kTilt_rad;
   std::array<double, 2> level{0, 0};

@@ -11,6 +11,8 @@
 //   PoseGraphReport report = graph.optimise({});
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "fbvins/geometry/pose.hpp"
@@ -26,9 +28,16 @@ struct PoseGraphOptions {
 struct PoseGraphEdge {
   int a = 0, b = 0;
   Pose<B, B> T_ab;
-  Mat6 information = Mat6::Identity();  ///< of (dp in a, dtheta in b)
-  bool loop = false;                    ///< may be an outlier
-  double weight = 1;                    ///< found by optimise(): 0 a false loop, 1 a good one
+  Mat6 information = Mat6::Identity();                    ///< of (dp in a, dtheta in b)
+  bool loop = false;                                      ///< may be an outlier
+  double weight = 1;                                      ///< found by optimise(): 0 a false loop, 1 a good one
+  std::optional<std::size_t> scale_a = {}, scale_b = {};  ///< by which the ends measure lengths; none: metres
+};
+
+/// The unit of a flight of one camera, as the logarithm of its length in M.
+struct PoseGraphScale {
+  double log = 0, sigma = 0;
+  bool fixed = false;
 };
 
 struct PoseGraphAnchor {
@@ -45,6 +54,12 @@ class PoseGraph {
   int add_node(const Pose<M, B>& T_MB, const Vec3& up_B, bool fixed = false);
   void add_edge(PoseGraphEdge edge) { edges_.push_back(edge); }
 
+  /// Of a flight whose lengths are off by a common factor, of this relative standard deviation.
+  std::size_t add_scale(PoseGraphScale scale) {
+    scales_.push_back(scale);
+    return scales_.size() - 1;
+  }
+
   void add_anchor(PoseGraphAnchor anchor) { anchors_.push_back(std::move(anchor)); }
 
   /// Fixed nodes stay. Fix one in each connected part, or give it anchors: without them the gauge is free.
@@ -56,10 +71,12 @@ class PoseGraph {
   double chi2(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
   double chi2(const PoseGraphAnchor& anchor) const;
   const std::vector<PoseGraphAnchor>& anchors() const { return anchors_; }
+  const std::vector<PoseGraphScale>& scales() const { return scales_; }
 
  private:
   Mat6 weighted_information(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
   Mat6 information_of(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const;
+  Vec6 residual_of(const PoseGraphEdge& edge) const;
   void weigh(double mu, const PoseGraphOptions& options);
   int solve(const PoseGraphOptions& options, PoseGraphReport& report);
 
@@ -68,6 +85,7 @@ class PoseGraph {
   std::vector<bool> fixed_;
   std::vector<PoseGraphEdge> edges_;
   std::vector<PoseGraphAnchor> anchors_;
+  std::vector<PoseGraphScale> scales_;
 };
 
 /// (dp in a, dtheta in b) of an edge at two poses.

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/loop/place_map.hpp"
@@ -190,6 +193,92 @@ TEST(PlaceMap, ThinningKeepsTheGraphTogether) {
     before += (f.odometry[i].p - f.truth[i].p).squaredNorm();
   }
   EXPECT_LT(std::sqrt(sum), 0.4 * std::sqrt(before));
+}
+
+/// Two flights along the same way, each of its own scale, which know one another's places.
+struct TwoScales {
+  PoseGraph graph;
+  std::vector<Pose<M, B>> truth;
+  std::size_t first = 0, second = 0;
+
+  TwoScales(double log_first, double sigma_first, double log_second, double sigma_second) {
+    Rng rng(7);
+    constexpr int kEach = 60;
+    const Flight f = flight(kEach, 0, 0, 7);
+    const Mat6 step = information(0.01, 0.002), loop = information(0.006, 0.002);
+    const auto unit = [&](double sigma) { return sigma > 0 ? std::optional(graph.add_scale({0, sigma, false})) : std::nullopt; };
+    const std::array<std::optional<std::size_t>, 2> scales{unit(sigma_first), unit(sigma_second)};
+    const auto scaled = [](Pose<B, B> T, double log) { return Pose<B, B>(T.q, Vec3(std::exp(-log) * T.p)); };
+    for (const double log : {log_first, log_second}) {
+      const bool later = !truth.empty();
+      for (int i = 0; i < kEach; ++i) {
+        const auto& T = f.truth[static_cast<std::size_t>(i)];
+        graph.add_node({T.q, Vec3(std::exp(-log) * T.p)}, T.q.conjugate() * Vec3::UnitZ(), !later && i == 0);
+        truth.push_back(T);
+        const int n = static_cast<int>(truth.size()) - 1;
+        if (i == 0) continue;
+        const Pose<B, B> T_ab = (truth[truth.size() - 2].inverse() * T).boxplus(noise(rng, 0.002), noise(rng, 0.0005));
+        graph.add_edge({n - 1, n, scaled(T_ab, log), step, false, 1, scales[later], scales[later]});
+      }
+    }
+    for (int i = 0; i < kEach; i += 2) {
+      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(kEach + (i + 3) % kEach);
+      const Pose<B, B> T_ab = (truth[a].inverse() * truth[b]).boxplus(noise(rng, 0.003), noise(rng, 0.001));
+      graph.add_edge({static_cast<int>(a), static_cast<int>(b), scaled(T_ab, 0.5 * (log_first + log_second)), loop, true, 1,
+                      scales[0], scales[1]});
+    }
+    if (scales[0]) first = *scales[0];
+    if (scales[1]) second = *scales[1];
+  }
+
+  double largest_error_m() const {
+    double most = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      most = std::max(most, (graph.poses()[i].p - graph.poses()[0].p - (truth[i].p - truth[0].p)).norm());
+    return most;
+  }
+};
+
+TEST(PoseGraphScale, AFlightTakesTheScaleOfOneThatMeasuresLengths) {
+  TwoScales s(0, 0, 0.04, 0.03);
+  EXPECT_GT(s.largest_error_m(), 0.1);
+  const PoseGraphReport report = s.graph.optimise({});
+  EXPECT_NEAR(s.graph.scales()[s.second].log, 0.04, 0.006);
+  EXPECT_LT(s.largest_error_m(), 0.02);
+  EXPECT_EQ(report.rejected, 0);
+}
+
+TEST(PoseGraphScale, TheScaleOfTwoLiesBetweenThemByWhatTheyKnow) {
+  TwoScales s(0.02, 0.02, -0.01, 0.01);
+  s.graph.optimise({});
+  const double first = s.graph.scales()[s.first].log, second = s.graph.scales()[s.second].log;
+  EXPECT_NEAR(first - second, 0.03, 0.002) << "what one has of the other is measured";
+  EXPECT_NEAR(first, 0.03 * 4 / 5, 0.002) << "of which the less certain takes the larger part, by the variances";
+  EXPECT_NEAR(first / (0.02 * 0.02), -second / (0.01 * 0.01), 10) << "which cost the same then";
+}
+
+TEST(PoseGraphScale, AFixedScaleStays) {
+  TwoScales s(0.02, 0.02, -0.01, 0.01);
+  PoseGraph fixed;
+  for (std::size_t i = 0; i < s.truth.size(); ++i)
+    fixed.add_node(s.graph.poses()[i], s.truth[i].q.conjugate() * Vec3::UnitZ(), i < s.truth.size() / 2);
+  fixed.add_scale({0, 0.02, true});
+  fixed.add_scale({0, 0.01, false});
+  for (const PoseGraphEdge& e : s.graph.edges()) fixed.add_edge(e);
+  fixed.optimise({});
+  EXPECT_EQ(fixed.scales()[0].log, 0);
+  EXPECT_NEAR(fixed.scales()[1].log, -0.03, 0.003);
+}
+
+TEST(PoseGraphScale, ResidualsFitWithTheScales) {
+  TwoScales s(0.02, 0.02, -0.01, 0.01);
+  const auto worst = [&] {
+    double most = 0;
+    for (const PoseGraphEdge& e : s.graph.edges()) most = std::max(most, s.graph.chi2(e, {}));
+    return most;
+  };
+  s.graph.optimise({});
+  EXPECT_LT(worst(), 16);
 }
 
 }  // namespace pose_graph_test
