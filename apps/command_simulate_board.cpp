@@ -85,6 +85,12 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->add_option("--line-delay", a->options.line_delay_us, "us from row to row of a rolling shutter")
       ->check(CLI::Range(0.0, 200.0))
       ->capture_default_str();
+  command->add_option("--imu-scale", a->options.imu_scale, "standard deviation of each axis' scale of the IMU, 0.01 is 1 %")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  command->add_option("--imu-axes", a->options.imu_axes_deg, "degrees, standard deviation of each axis' direction")
+      ->check(CLI::Range(0.0, 5.0))
+      ->capture_default_str();
   command
       ->add_option("--motion", a->movements, "the hand's only movements: distance, across, up, aim (at the board's parts), roll")
       ->delimiter(',')

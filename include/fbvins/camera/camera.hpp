@@ -54,7 +54,7 @@ class Camera {
   std::array<double, 4> intrinsics() const;
   /// The model's other parameters, in the order of its struct.
   std::vector<double> distortion() const;
-  /// Mean focal length, px.
+  /// Pixels a radian at the axis, mean of both directions: of ds and omni-radtan fx / (1 + xi), else fx.
   double focal_px() const;
 
   /// What of the image shows something else than the world, of the camera's size (check_rig); null where all of it does.

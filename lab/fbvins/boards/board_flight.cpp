@@ -10,6 +10,7 @@
 #include "fbvins/calibration/board_image.hpp"
 #include "fbvins/calibration/simulated_board.hpp"
 #include "fbvins/calibration/target_file.hpp"
+#include "fbvins/core/angle.hpp"
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 #include "fbvins/sim/imu_model.hpp"
@@ -76,6 +77,16 @@ SimulatedRig further_camera(const Camera& left, int k) {
   const double side = k % 2 == 0 ? 1 : -1;
   return {{left, Camera(with_parameters(left.model(), own.data()), left.width(), left.height())},
           {{}, {so3_exp(Vec3(0.01, -0.1 * side, 0.02)), Vec3(0.055 + 0.11 * side, 0.06, 0.01)}}};
+}
+
+/// Nothing of an IMU whose readings are as they should be.
+std::string imu_truth(const SimulatedImu& imu) {
+  if (imu.gyro_axes.isIdentity(0) && imu.accel_axes.isIdentity(0)) return "";
+  const auto rows = [](const Mat3& m) {
+    const Mat3 transposed = m.transpose();
+    return fmt::format("[{:.9f}]", fmt::join(transposed.data(), transposed.data() + 9, ", "));
+  };
+  return fmt::format("gyro_axes: {}\naccel_axes: {}\n", rows(imu.gyro_axes), rows(imu.accel_axes));
 }
 
 Result<void> write_whole(const std::string& path, const std::string& text) {
@@ -159,13 +170,14 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
     if (progress) progress(i + 1, count);
   }
   ImuModelOptions imu;
-  imu.scale_error = imu.misalignment_rad = 0;
+  imu.scale_error = options.imu_scale, imu.misalignment_rad = options.imu_axes_deg * kDegree;
   imu.vibration_accel_mps2 = imu.vibration_gyro_radps = imu.rumble_accel_mps2_rthz = imu.rumble_gyro_radps_rthz = 0;
   const SimulatedImu readings = simulate_imu(hand, rig->imu_noise, imu, Time{kStart_ns}, seed + 1);
   if (Result<void> done = finish_recording(*recording, readings); !done) return done;
   const std::string truth =
       fmt::format("lens: {}\ntime_offset_s: {}\nseed: {}\nexposure_ms: {}\nblur_px: {}\nnoise: {}\n", options.lens,
-                  rig->time_offset_s, options.seed, options.exposure_ms, options.blur_px, options.noise);
+                  rig->time_offset_s, options.seed, options.exposure_ms, options.blur_px, options.noise) +
+      imu_truth(readings);
   if (Result<void> done = write_whole(folder + "/simulation.yaml", truth); !done) return done;
   return write_whole(folder + "/target.yaml", target_to_yaml(options.board));
 }

@@ -28,6 +28,8 @@ struct BoardFlightOptions {
   double time_offset_ms = 5;  ///< stamp of the IMU less that of the image at the same instant
   double later_ms = 0;        ///< so much later than the one before it each camera takes its image, which has the same stamp
   double line_delay_us = 0;   ///< from row to row of a rolling shutter; the image's stamp is its middle row's
+  double imu_scale = 0;       ///< standard deviation of each axis' scale of the IMU, 0.01 is 1 %
+  double imu_axes_deg = 0;    ///< of each axis' direction
   int seed = 1;
   std::vector<int> missing_tags = {};  ///< places of the board that stay white
   HandMotion motion = {};              ///< for recordings that do not determine a calibration

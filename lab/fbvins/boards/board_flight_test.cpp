@@ -9,6 +9,7 @@
 #include "fbvins/calibration/camera_calibration.hpp"
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
+#include "fbvins/io/file_source.hpp"
 
 namespace fbvins {
 namespace board_flight_test {
@@ -65,6 +66,22 @@ TEST(BoardFlight, ARecordingOfAnotherBoardIsRefused) {
 }
 
 #endif
+
+TEST(BoardFlight, TheImusAxesAreToldWhereTheyAreWrong) {
+  const std::string folder = testing::TempDir() + "board_flight_axes";
+  for (const double scale : {0.0, 0.01}) {
+    std::filesystem::remove_all(folder);
+    BoardFlightOptions options;
+    options.cameras = 1, options.seconds = 1, options.image_rate_hz = 1;
+    options.imu_scale = scale, options.imu_axes_deg = 50 * scale;
+    ASSERT_TRUE(simulate_board(options, folder, {}));
+    const Result<std::string> truth = read_file(folder + "/simulation.yaml", 1u << 16u);
+    ASSERT_TRUE(truth);
+    for (const char* name : {"gyro_axes: [", "accel_axes: ["})
+      EXPECT_EQ(truth->find(name) != std::string::npos, scale > 0) << name;
+  }
+  std::filesystem::remove_all(folder);
+}
 
 TEST(BoardFlight, AnUnknownLensIsRefused) {
   const auto rig = board_flight_rig({.board = {}, .lens = "fov"});

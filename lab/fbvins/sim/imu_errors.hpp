@@ -22,6 +22,8 @@ class ImuErrors {
   ImuErrors(const ImuNoise& noise, const ImuModelOptions& options, std::uint64_t seed);
 
   const ImuBias& bias() const { return bias_; }
+  const Mat3& gyro_axes() const { return gyro_axes_; }
+  const Mat3& accel_axes() const { return accel_axes_; }
   /// Readings come at noise.rate_hz.
   ImuSample read(Time t, const MotionState& motion, const Shake& shake);
 

@@ -61,6 +61,7 @@ SimulatedImu simulate_imu(const SplineTrajectory& flight, const ImuNoise& noise,
   Vibration vibration(shaking);
 
   SimulatedImu imu;
+  imu.gyro_axes = errors.gyro_axes(), imu.accel_axes = errors.accel_axes();
   double power = 0;
   const int n = static_cast<int>(std::floor(flight.duration_s() * noise.rate_hz)) + 1;
   for (int i = 0; i < n; ++i) {

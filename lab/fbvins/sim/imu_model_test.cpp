@@ -126,5 +126,19 @@ TEST(ImuModel, VibrationHasItsStrengthInFlightAndNoneAtRest) {
   EXPECT_NEAR(std::sqrt(squares / count), 0.5, 0.1);
 }
 
+TEST(ImuModel, TheAxesThatAreToldAreThoseOfTheReadings) {
+  ImuModelOptions options = ideal();
+  options.scale_error = 0.02, options.misalignment_rad = 0.01;
+  const SplineTrajectory motion = in_motion();
+  const SimulatedImu imu = simulate_imu(motion, ImuNoise{}, options, Time{0}, 7);
+  EXPECT_GT((imu.gyro_axes - Mat3::Identity()).cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_GT((imu.accel_axes - imu.gyro_axes).cwiseAbs().maxCoeff(), 0.01);
+  for (std::size_t i = 0; i < imu.samples.size(); i += 50) {
+    const MotionState truth = motion.at((imu.samples[i].t - Time{0}).seconds());
+    EXPECT_LT((imu.samples[i].gyro_radps - imu.gyro_axes * truth.w_WB_B).norm(), 1e-9) << i;
+    EXPECT_LT((imu.samples[i].accel_mps2 - imu.accel_axes * truth.specific_force()).norm(), 1e-9) << i;
+  }
+}
+
 }  // namespace imu_model_test
 }  // namespace fbvins

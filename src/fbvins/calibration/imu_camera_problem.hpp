@@ -54,7 +54,7 @@ struct CalibrationState {
   std::vector<ImuBias> biases;  ///< one every so many intervals of the path, from its start
   std::vector<Pose<B, Cn>> T_BC;
   double time_offset_s = 0, line_delay_s = 0;
-  std::vector<double> later_s;  ///< of each camera beside the time offset; 0 of camera 0
+  std::vector<double> later_s = {};  ///< of each camera beside the time offset; 0 of camera 0
   Vec3 gravity_T = Vec3(0, 0, -9.81);
   double board_scale = 1;
   ImuTriads axes;

@@ -78,14 +78,14 @@ void detect(apriltag_detector_t* detector, const ImageView& image, std::vector<T
   for (int i = 0; i < zarray_size(found); ++i) {
     apriltag_detection_t* detection = nullptr;
     zarray_get(found, i, &detection);
-    TagDetection found;
-    found.id = detection->id;
-    for (int k = 0; k < 4; ++k) found.corners[k] = Vec2(detection->p[k][0] - 0.5, detection->p[k][1] - 0.5);
+    TagDetection tag;
+    tag.id = detection->id;
+    for (int k = 0; k < 4; ++k) tag.corners[k] = Vec2(detection->p[k][0] - 0.5, detection->p[k][1] - 0.5);
     // One that was found before in the same place.
     const bool known = std::ranges::any_of(out, [&](const TagDetection& s) {
-      return s.id == found.id && (s.corners[0] - found.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
+      return s.id == tag.id && (s.corners[0] - tag.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
     });
-    if (!known) out.push_back(found);
+    if (!known) out.push_back(tag);
   }
   apriltag_detections_destroy(found);
 }

@@ -171,7 +171,13 @@ std::vector<double> Camera::distortion() const {
 }
 
 double Camera::focal_px() const {
-  return std::visit([](const auto& m) { return 0.5 * (m.fx + m.fy); }, model_);
+  return std::visit(
+      [](const auto& m) {
+        double scale = 1;
+        if constexpr (requires { m.xi; }) scale += m.xi;  // ds and omni-radtan: the axis' point is 1 + xi from the centre
+        return 0.5 * (m.fx + m.fy) / scale;
+      },
+      model_);
 }
 
 bool Camera::in_domain(const Vec3& p_lens) const { return std::atan2(p_lens.head<2>().norm(), p_lens.z()) <= widest_rad_; }

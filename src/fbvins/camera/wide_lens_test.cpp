@@ -106,6 +106,16 @@ TEST(WideLens, JacobianIsTheDerivativeOfDistort) {
 }
 
 /// At xi = 0 the double sphere is the unified model, which is the extended one at beta = 1, and Mei's without distortion.
+TEST(WideLens, TheFocalLengthIsPixelsARadianAtTheAxis) {
+  constexpr double kAngle_rad = 1e-3;
+  for (const Camera& camera : all()) {
+    const Vec2 axis = *camera.project(Vec3(0, 0, 1));
+    const double across = camera.project(Vec3(kAngle_rad, 0, 1))->x() - axis.x();
+    const double down = camera.project(Vec3(0, kAngle_rad, 1))->y() - axis.y();
+    EXPECT_NEAR(0.5 * (across + down) / kAngle_rad, camera.focal_px(), 1e-3 * camera.focal_px()) << camera.model_name();
+  }
+}
+
 TEST(WideLens, TheModelsAgreeWhereTheyCoincide) {
   const double alpha = 0.4, xi = alpha / (1 - alpha), f = 200 / (1 - alpha);
   const Camera cameras[] = {{DoubleSphere{200, 200, 320, 240, 0, alpha}, 640, 480},

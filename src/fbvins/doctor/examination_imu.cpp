@@ -244,10 +244,10 @@ void Examination::time_offset(const MotionFit& fit) {
   const double wrong_s = fit.offset_s - evidence_.rig.time_offset_s;
   if (std::abs(wrong_s) < kTimePractical_s || std::abs(wrong_s) < kSignificant * fit.offset_sigma_s) return;
   Finding& finding = found(FindingKind::time_offset, 1e3 * wrong_s, 1e3 * fit.offset_sigma_s, "ms");
-  finding.measured = fmt::format("the IMU's stamps are {:.2f} +- {:.2f} ms {} the images'", std::abs(finding.size), finding.sigma,
-                                 finding.size > 0 ? "late against" : "ahead of");
-  finding.expected = fmt::format("{:.1f} ms by the calibration (t_imu = t_image + {:.5f} s)", 1e3 * evidence_.rig.time_offset_s,
-                                 evidence_.rig.time_offset_s);
+  finding.measured = fmt::format(
+      "t_imu = t_image {:+.2f} +- {:.2f} ms at one instant: the IMU's stamps are {:.2f} ms {} than the calibration says",
+      1e3 * fit.offset_s, finding.sigma, std::abs(finding.size), finding.size > 0 ? "later" : "earlier");
+  finding.expected = fmt::format("t_imu = t_image {:+.2f} ms by the calibration", 1e3 * evidence_.rig.time_offset_s);
   if (has(FindingKind::image_stamps)) {  // an offset of the mean delay: with it a flight may be worse than without
     finding.advice =
         "stamp the images at the moment of exposure, and examine a new recording: no offset corrects stamps that vary";

@@ -175,7 +175,7 @@ Result<DeviceFacts> parse_device_facts(std::string_view text) {
   return facts;
 }
 
-double blur_px(const Camera& camera, double exposure_ms) { return 1e-3 * exposure_ms * camera.intrinsics()[0]; }
+double blur_px(const Camera& camera, double exposure_ms) { return 1e-3 * exposure_ms * camera.focal_px(); }
 
 std::vector<SensorFinding> device_findings(const DeviceFacts& facts, const StereoRig& rig) {
   Findings findings;

@@ -62,6 +62,7 @@ struct TrueState {
 struct SimulatedImu {
   std::vector<ImuSample> samples;
   std::vector<TrueState> truth;
+  Mat3 gyro_axes = Mat3::Identity(), accel_axes = Mat3::Identity();  ///< a reading is axes * truth + bias
 };
 
 /// Samples at noise.rate_hz over the whole trajectory; the first is at `start`.
