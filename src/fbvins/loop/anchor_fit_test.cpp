@@ -60,6 +60,15 @@ TEST(FitAnchors, TagsGiveItAtOnePlace) {
   EXPECT_LT(error_rad(*fit), 0.04);
 }
 
+TEST(FitAnchors, TagsAreAsCertainAsTheVertical) {
+  Rng rng(2);
+  std::vector<AnchoredPose> poses;
+  for (int i = 0; i < 4; ++i) poses.push_back(with_tag(walk(i, 1000, 1), rng, 0.002, 0.003));
+  EXPECT_TRUE(fit_anchors(poses, Vec3(0, 0, 1)));
+  for (AnchoredPose& pose : poses) pose.tilt_rad = 2 * 0.08;  // 16 cm at two metres, shared by four
+  EXPECT_FALSE(fit_anchors(poses, Vec3(0, 0, 1)));
+}
+
 TEST(FitAnchors, OutliersAreLeftOut) {
   Rng rng(3);
   std::vector<AnchoredPose> poses;
