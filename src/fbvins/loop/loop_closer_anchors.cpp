@@ -5,6 +5,7 @@
 
 #include "fbvins/loop/anchor_fit.hpp"
 #include "fbvins/loop/loop_closer.hpp"
+#include "fbvins/loop/map_edges.hpp"
 
 namespace fbvins {
 namespace {
