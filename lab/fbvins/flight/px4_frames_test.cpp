@@ -27,6 +27,8 @@ TEST(Px4Frames, MountingOptionsKeepTheMounting) {
   for (int i = 0; i < 20; ++i) mountings.emplace_back(any_rotation(rng), Vec3(rng.normal(), rng.normal(), rng.normal()));
   for (const auto& T_VB : mountings) {
     const Pose<BodyFrd, B> told = mounting(mounting_options_of(T_VB));
+    EXPECT_EQ(mounting_options_of(T_VB).local_frame, LocalOrigin::vehicle);
+    EXPECT_EQ(mounting_options_of(T_VB, true).local_frame, LocalOrigin::map);
     const Vec3 x(0.3, -0.2, 0.9);
     EXPECT_LT((told * x - flu_to_frd(Vec3(T_VB * x))).norm(), 1e-9);
   }

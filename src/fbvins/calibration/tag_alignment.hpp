@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: the pose of a tag by all of its pixels, as its four corners do not give it: where white spreads over black, by the
-// lens and by how the sensor turns light into grey values, a tag that stands alone looks smaller than it is, and each corner is
-// off in the same direction. Inside of the pattern white spreads to both sides (docs/derivations/loop.md, L36). A pure function.
+// Private: the pose of a tag by all of its pixels (docs/derivations/loop.md, L36). Its four corners do not give it as well: by
+// the blur and the response of the sensor white spreads over black, and a tag that stands alone looks smaller than it is. Inside
+// of the pattern white spreads to both sides, and tells how far. A pure function.
 #pragma once
 
 #include <optional>

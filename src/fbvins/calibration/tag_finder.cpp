@@ -19,8 +19,7 @@ constexpr double kSmallest_px = 16;
 /// The second pose of a small tag is possible up to this squared distance in standard deviations.
 constexpr double kPossible = 9;
 
-/// Adds that it may be the other pose: on the way from one to the other, which is none along a line, and so by as much to all
-/// sides.
+/// Adds that it may be the other pose (L25). The way from one to the other is no straight line: it grows to all sides.
 void widen(Mat6& covariance, const Pose<Cn, T>& pose, const Pose<Cn, T>& other) {
   Vec6 apart;
   apart << other.p - pose.p, so3_log(pose.q.conjugate() * other.q);

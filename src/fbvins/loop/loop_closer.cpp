@@ -13,9 +13,6 @@
 namespace fbvins {
 namespace {
 
-/// Standard deviation of the difference between the map's and the odometry's roll and pitch. Factor on the covariance by which a
-/// place of the flight itself corrects M: those that follow one another share the error with which it was mapped.
-constexpr double kTiltSigma_rad = 0.005, kSharedError = 4;
 /// A new map begins as the gauge of its first flight, aligned with gravity.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
 /// Prior of T_MG at relocalisation, before the recognised pose is applied as a measurement.
@@ -222,7 +219,7 @@ std::vector<LoopCloser::Proposal> LoopCloser::look_at(const MapKeyframe& query, 
 /// What a place or a tag that was seen before says of the body, unless it contradicts the odometry.
 bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   // The error that different roll and pitch cause through the lever arm is not drift.
-  double tilt_variance = kTiltSigma_rad * kTiltSigma_rad;
+  double tilt_variance = kMapTilt_rad * kMapTilt_rad;
   if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kMostOfAKeyframe = 8;
 /// Anchors by which M is found: of more, evenly so many.
 constexpr std::size_t kMostToFind = 400;
-/// Of more anchors, the error of the vertical that they share is taken for that of so many.
+/// Anchors share the error of the vertical, so that it counts times the root of their number, but of at most so many.
 constexpr std::size_t kMostAlike = 16;
 /// A new M is levelled anew where it leans by more than this, and by more than so many standard deviations of the vertical.
 constexpr double kLeaning_rad = 0.25 * kDegree, kLeaningSigmas = 3;
@@ -131,7 +131,7 @@ std::vector<AnchoredPose> LoopCloser::anchored_poses() const {
   }
   std::vector<AnchoredPose> poses;
   const std::size_t count = std::min(usable.size(), kMostToFind);
-  // The vertical is wrong by the same for all of them, so that their mean is no better.
+  // The vertical is wrong by the same for all of them: their mean is no better than one.
   const double shared = std::sqrt(static_cast<double>(std::min(count, kMostAlike)));
   for (std::size_t i = 0; i < count; ++i) {
     poses.push_back(anchored_pose(*usable[i * usable.size() / count]));

@@ -9,9 +9,8 @@
 namespace fbvins {
 namespace {
 
-/// Of a map's vertical against gravity. Places that follow one another share errors: factor on their variance, and what no
-/// number of them falls below.
-constexpr double kMapTilt_rad = 0.005, kSharedError = 4, kFloor_rad = 0.1 * kDegree;
+/// No number of places is more certain than this.
+constexpr double kFloor_rad = 0.1 * kDegree;
 /// A place that is farther from gravity, in standard deviations, is not used.
 constexpr double kGate_sigma = 5;
 

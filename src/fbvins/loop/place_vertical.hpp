@@ -14,6 +14,11 @@
 
 namespace fbvins {
 
+/// Standard deviation of a map's vertical against gravity.
+inline constexpr double kMapTilt_rad = 0.005;
+/// Places that follow one another share the error with which they were mapped: factor on the covariance of each.
+inline constexpr double kSharedError = 4;
+
 struct LevelledGauge {
   Quat q_LG = Quat::Identity();  ///< the shortest rotation that takes up in G to z
   double up_sigma_rad = 0;       ///< standard deviation of that direction
