@@ -70,7 +70,7 @@ MapEdge step(const MapKeyframe& from, const MapKeyframe& to) {
 
 int make(const Arguments& a, const Vocabulary& vocabulary) {
   PlaceMap map;
-  map.T_BC0 = test_room::rig().T_BC0;
+  map.cameras[0] = test_room::rig().T_BC0;
   map.vocabulary = vocabulary.fingerprint();
   test_room::World world;
   for (int i = 0; i < a.keyframes; ++i) {
@@ -188,7 +188,7 @@ int fly(const Arguments& a, const Vocabulary& vocabulary) {
   LoopCloser closer(test_room::rig(), options, vocabulary, *std::move(map));
   const double open_s = watch.lap_ms() / 1000, opened_mb = memory_mb("VmRSS");
   // Another index of the same map, for its own times.
-  CandidateSearch search(vocabulary.words(), test_room::rig().T_BC0, options.max_distance_m);
+  CandidateSearch search(vocabulary.words(), options.max_distance_m);
   if (closer.map().store) search.add(closer.map().store);
   for (const MapKeyframe& k : closer.map().keyframes())
     if (k.stored < 0) search.add(k.id, k.place.words);

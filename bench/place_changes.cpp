@@ -170,7 +170,7 @@ void ask(const MapOfRooms& all, const Query& query, const Pose<B, C0>& T_BC0, Pl
 
 Table measure(int threads, const std::vector<SeenRoom>& rooms, const Setting& setting, const DescriptorKind& kind) {
   const Pose<B, C0> T_BC0 = euroc_rig().T_BC0;
-  CandidateSearch search(kind.vocabulary.words(), T_BC0, LoopOptions{}.max_distance_m);
+  CandidateSearch search(kind.vocabulary.words(), LoopOptions{}.max_distance_m);
   const MapOfRooms all = map_of(rooms, setting.kind, search);
   // The search has one thread, verification many.
   std::vector<std::array<std::vector<std::vector<KeyframeId>>, kConditions.size()>> candidates(rooms.size());
@@ -207,7 +207,8 @@ std::string described(const Setting& setting) {
 
 void print_row(const char* name, const Row& r) {
   const double queries = std::max(r.queries, 1);
-  const double error_mm = 1e3 * median_part(r.errors, &PoseError::m), error_deg = median_part(r.errors, &PoseError::rad) / kDegree;
+  const double error_mm = 1e3 * median_part(r.errors, &PoseError::m),
+               error_deg = median_part(r.errors, &PoseError::rad) / kDegree;
   fmt::print("| {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.2f} | {} | {} |\n", name, r.queries, r.known,
              100 * r.known / queries, 100 * r.verifiable / queries, error_mm, error_deg, r.pairs, r.wrong());
 }
@@ -263,9 +264,8 @@ void run(const Arguments& arguments) {
   const std::vector<DescriptorKind> kinds = kinds_of(arguments);
   const std::vector<Setting> settings = settings_of(arguments, kinds);
   std::vector<SeenRoom> rooms(static_cast<std::size_t>(arguments.rooms));
-  in_parallel(arguments.threads, rooms.size(), [&](std::size_t i) {
-    rooms[i] = look_at_room(arguments.seed + static_cast<int>(i), i, arguments.samples, kinds);
-  });
+  in_parallel(arguments.threads, rooms.size(),
+              [&](std::size_t i) { rooms[i] = look_at_room(arguments.seed + static_cast<int>(i), i, arguments.samples, kinds); });
   fmt::print("{} rooms from seed {}\n", arguments.rooms, arguments.seed);
   std::FILE* file = arguments.accepted.empty() ? nullptr : std::fopen(arguments.accepted.c_str(), "w");
   for (const Setting& setting : settings) {

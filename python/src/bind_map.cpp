@@ -53,7 +53,7 @@ Array<double> points_of(const MapContents& contents) {
   std::vector<Vec3> points;
   for (const MapKeyframe& k : contents.map.keyframes())
     for (const PlaceFeature& f : k.place.features)
-      if (f.has_point()) points.push_back(k.T_MB * (contents.map.T_BC0 * f.p_C0()));
+      if (f.has_point()) points.push_back(contents.map.T_MC(k) * f.p_C0());
   return columns(points, [](const Vec3& p) { return p; });
 }
 

@@ -17,11 +17,9 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_report.hpp"
@@ -43,9 +41,9 @@ struct MapOptions {
 
 class LoopMap final : public Mapper {
  public:
-  /// Of a rig of more than two cameras the map has the places that its first pair sees; of cameras that all see different things,
-  /// those of the first. An error where an option is out of range, or the map, the vocabulary or the network cannot be read or
-  /// do not belong together.
+  /// Of a rig of more than two cameras the map has the places that its pairs see, in turns; of cameras that all see different
+  /// things, those of all of them. An error where an option is out of range, or the map, the vocabulary or the network cannot be
+  /// read or do not belong together.
   static Result<std::unique_ptr<LoopMap>> create(const StereoRig& rig, const MapOptions& options = {});
   ~LoopMap() override;
 
@@ -80,11 +78,10 @@ class LoopMap final : public Mapper {
   Result<void> save(const std::string& path) const;
 
  private:
-  LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> cameras);
+  explicit LoopMap(std::unique_ptr<LoopCloser> closer);
 
   std::unique_ptr<LoopCloser> closer_;
   std::unique_ptr<MapJournal> journal_;
-  std::optional<CameraGroup> cameras_;  ///< whose places it has; none: of the whole rig
 };
 
 }  // namespace fbvins

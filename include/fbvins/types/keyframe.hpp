@@ -17,8 +17,9 @@ namespace fbvins {
 /// A landmark of the sliding window as this keyframe sees it.
 struct KeyframeLandmark {
   TrackId track;
-  Vec2 pixel = Vec2::Zero();  ///< in the raw left image, px
+  Vec2 pixel = Vec2::Zero();  ///< in the raw image of `camera`, px
   Vec3 p_B = Vec3::Zero();    ///< in the body at the keyframe, m
+  int camera = 0;             ///< of the rig; of a pair the left one where both see it
 };
 
 /// The IMU's readings since the keyframe before, with the bias, noise and gravity to preintegrate them with.

@@ -143,9 +143,10 @@ Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& 
   out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
     const StereoObservation* seen = l.triangulated ? l.observation_in(f.id) : nullptr;
-    if (seen == nullptr || !seen->left || l.cameras.left != 0) continue;
+    if (seen == nullptr) continue;
     const Vec3 p_C = scaled_point_in_camera(l, f, window.frames(), calibration) / l.alpha_beta_rho.z();
-    out.landmarks.push_back({l.track, seen->left->pixel, calibration.T_BC0 * p_C});
+    const Observation& shown = seen->left ? *seen->left : *seen->right;
+    out.landmarks.push_back({l.track, shown.pixel, calibration.T_BC(l.cameras.left) * p_C, l.cameras[!seen->left]});
   }
   return out;
 }

@@ -79,7 +79,7 @@ void Adjustment::add(const FeatureTrack& track) {
   std::vector<Observation> observations;
   for (const FeatureView& view : track) {
     const MapKeyframe& k = keyframe(view.keyframe);
-    const Vec3 p_C = (k.T_MB * map_.T_BC0).inverse() * Vec3(point->data());
+    const Vec3 p_C = map_.T_MC(k).inverse() * Vec3(point->data());
     if (p_C.z() > kNearest_m) observations.push_back({view.keyframe, start_.points.size(), &k.place.features[view.feature]});
   }
   if (observations.size() < 2) return;
@@ -93,7 +93,7 @@ std::optional<PointBlock> Adjustment::first_point(const FeatureTrack& track) con
     const MapKeyframe& k = keyframe(view.keyframe);
     const PlaceFeature& f = k.place.features[view.feature];
     if (!f.has_point()) continue;
-    const Vec3 p = k.T_MB * map_.T_BC0 * f.p_C0();
+    const Vec3 p = map_.T_MC(k) * f.p_C0();
     return PointBlock{p.x(), p.y(), p.z()};
   }
   return std::nullopt;
@@ -110,7 +110,7 @@ void Adjustment::choose_anchors() {
   for (const MapAnchor& anchor : map_.anchors) {
     const auto at = static_cast<std::size_t>(map_.find(anchor.keyframe) - map_.keyframes().data());
     const MapKeyframe& k = keyframe(at);
-    const Mat6 L = tilt_error(anchor.measured, k.T_MB.q, map_.T_BC0.q * k.place.up_C0, kTilt_rad);
+    const Mat6 L = tilt_error(anchor.measured, k.T_MB.q, map_.up_B(k), kTilt_rad);
     const Vec6 r = residual(anchor.measured, k.T_MB.q, k.T_MB.p);
     const double chi2 = r.dot(widened(anchor.measured.information, L) * r);
     if (k.placed && chi2 < kAnchorOutlier_sigma * kAnchorOutlier_sigma) anchors_.push_back({at, &anchor.measured});
@@ -214,7 +214,7 @@ void Adjustment::add_verticals(ceres::Problem& problem, AdjustmentState& x) cons
   constexpr double per_sigma = 1 / kTilt_rad;
   for (std::size_t i = 0; i < x.poses.size(); ++i) {
     if (!problem.HasParameterBlock(x.poses[i].data()) || has_readings_[i]) continue;
-    const Vec3 up_B = map_.T_BC0.q * keyframe(i).place.up_C0;
+    const Vec3 up_B = map_.up_B(keyframe(i));
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<GravityCost, 2, 6, 2>(new GravityCost{keyframe(i).T_MB.q, up_B, per_sigma}), nullptr,
         x.poses[i].data(), x.tilt.data());
@@ -325,8 +325,7 @@ void Adjustment::write(const AdjustmentState& x, PlaceMap& map) const {
     map.keyframes()[i].T_MB = {orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()).normalized(), Vec3(x.poses[i].data())};
   (void)map.turn(turn_of(x.tilt).conjugate(), map.keyframes()[0].T_MB.p);
   for (std::size_t i = 0; i < x.poses.size(); ++i)
-    if (MapKeyframe& k = map.keyframes()[i]; has_readings_[i])
-      k.place.up_C0 = (k.T_MB.q * map.T_BC0.q).conjugate() * Vec3::UnitZ();
+    if (MapKeyframe& k = map.keyframes()[i]; has_readings_[i]) k.place.up_C0 = map.T_MC(k).q.conjugate() * Vec3::UnitZ();
 }
 
 }  // namespace fbvins

@@ -67,7 +67,9 @@ class Adjustment {
     const MapEdge* edge;
   };
 
-  ObservationCost cost_of(const Observation& s) const { return {keyframe(s.keyframe).T_MB.q, map_.T_BC0, *s.feature}; }
+  ObservationCost cost_of(const Observation& s) const {
+    return {keyframe(s.keyframe).T_MB.q, map_.T_BC(keyframe(s.keyframe)), *s.feature};
+  }
   const MapKeyframe& keyframe(std::size_t i) const { return map_.keyframes()[i]; }
   Pose<M, B> pose(const AdjustmentState& x, std::size_t i) const {
     return {orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()), Vec3(x.poses[i].data())};

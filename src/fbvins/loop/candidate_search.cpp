@@ -18,8 +18,9 @@ constexpr std::size_t kManyEntries = 100'000, kFewestWords = 40;
 constexpr int kShortlist = 120;
 /// To compare with the words of a keyframe is as much work as so many entries of the index.
 constexpr std::size_t kEntriesOfAKeyframe = 1000;
-/// Keyframes younger than this make no loop: the odometry connects them.
-constexpr double kMinAge_s = 2;
+/// Keyframes younger than this make no loop, nor do those that the flight has left for a place farther away than this share of
+/// the way since: the odometry connects them.
+constexpr double kMinAge_s = 2, kCameBack = 0.5;
 /// Keyframes that look in a direction that differs more are no candidates.
 constexpr double kMaxAngle_rad = 65 * kDegree;
 /// The search reaches so many standard deviations of the position farther.
@@ -30,6 +31,12 @@ constexpr double kGroup_s = 3;
 constexpr float kNeighbourShare = 0.25f;
 
 double seconds_between(const MapKeyframe& a, const MapKeyframe& b) { return std::abs((a.t - b.t).seconds()); }
+
+/// Of one flight, which has turned around since, or moved about in one place.
+bool came_back(const MapKeyframe& query, const MapKeyframe& k, double distance2_m2) {
+  const double back_m = kCameBack * (query.path_m - k.path_m);
+  return seconds_between(query, k) >= kMinAge_s && distance2_m2 <= back_m * back_m;
+}
 
 /// Of one flight: those of another may have the same stamps.
 bool neighbours(const MapKeyframe& a, const MapKeyframe& b) { return a.session == b.session && seconds_between(a, b) < kGroup_s; }
@@ -62,12 +69,14 @@ std::vector<KeyframeId> one_of_each_place(const PlaceMap& map, const std::vector
 
 std::vector<KeyframeId> CandidateSearch::plausible(const PlaceMap& map, const MapKeyframe& query, double sigma_m) const {
   const double reach = max_distance_m_ + kReach_sigma * sigma_m, min_cos = std::cos(kMaxAngle_rad);
-  const Vec3 axis = query.T_MB.q * (T_BC0_.q * Vec3::UnitZ());
+  const auto axis_of = [&](const MapKeyframe& k) -> Vec3 { return k.T_MB.q * (map.T_BC(k).q * Vec3::UnitZ()); };
+  const Vec3 axis = axis_of(query);
   std::vector<KeyframeId> ids;
   for (const MapKeyframe& k : map.keyframes()) {
-    if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach || !k.placed) continue;  // the distance first: most are far
-    if (k.session == query.session && seconds_between(query, k) < kMinAge_s) continue;
-    if ((k.T_MB.q * (T_BC0_.q * Vec3::UnitZ())).dot(axis) < min_cos) continue;
+    const double distance2 = (k.T_MB.p - query.T_MB.p).squaredNorm();
+    if (distance2 > reach * reach || !k.placed) continue;  // the distance first: most are far
+    if (k.session == query.session && !came_back(query, k, distance2)) continue;
+    if (axis_of(k).dot(axis) < min_cos) continue;
     ids.push_back(k.id);
   }
   return ids;

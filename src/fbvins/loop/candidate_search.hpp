@@ -2,7 +2,7 @@
 // Candidates of the map for the place of a new keyframe: those most similar by words, one of each place. One thread
 // at a time.
 //
-//   CandidateSearch search(vocabulary.words(), T_BC0, 4.0);
+//   CandidateSearch search(vocabulary.words(), 4.0);
 //   search.add(id, place.words);
 //   for (KeyframeId id : search.around(map, query, sigma_m)) verify(id);   // W is known in M
 //   for (KeyframeId id : search.anywhere(map, query)) verify(id);          // it is not
@@ -17,15 +17,15 @@ namespace fbvins {
 
 class CandidateSearch {
  public:
-  CandidateSearch(int words, const Pose<B, C0>& T_BC0, double max_distance_m)
-      : index_(words), T_BC0_(T_BC0), max_distance_m_(max_distance_m) {}
+  CandidateSearch(int words, double max_distance_m) : index_(words), max_distance_m_(max_distance_m) {}
 
   /// All keyframes of a file; before any other.
   void add(std::shared_ptr<PlaceStore> store) { index_.add(std::move(store)); }
   void add(KeyframeId id, const BowVector& words) { index_.add(id, words); }
   void remove(KeyframeId id, const BowVector& words) { index_.remove(id, words); }
 
-  /// Among keyframes near `query.T_MB`, whose position has the standard deviation `sigma_m`, that look in a similar direction.
+  /// Among keyframes near `query.T_MB`, whose position has the standard deviation `sigma_m`, whose cameras look in a similar
+  /// direction as that of `query`, which is one of the map's.
   std::vector<KeyframeId> around(const PlaceMap& map, const MapKeyframe& query, double sigma_m);
   /// Among all that have a place in M.
   std::vector<KeyframeId> anywhere(const PlaceMap& map, const MapKeyframe& query);
@@ -36,7 +36,6 @@ class CandidateSearch {
   std::vector<IndexHit> most_similar(const PlaceMap& map, const BowVector& words, const std::vector<KeyframeId>& among);
 
   InvertedIndex index_;
-  Pose<B, C0> T_BC0_;
   double max_distance_m_;
 };
 

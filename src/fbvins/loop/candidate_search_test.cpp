@@ -9,7 +9,14 @@ namespace fbvins {
 namespace candidate_search_test {
 
 constexpr int kWords = 10;
+constexpr double kFlown_m = 100;                                                    // until the query, far from all others
 const Pose<B, C0> kForward(so3_exp(Vec3(0, 1.5707963267948966, 0)), Vec3::Zero());  // the camera looks along the body's x
+
+PlaceMap forward() {
+  PlaceMap map;
+  map.cameras[0] = kForward;
+  return map;
+}
 
 class Search : public testing::Test {
  protected:
@@ -27,12 +34,13 @@ class Search : public testing::Test {
   static MapKeyframe query(double t_s) {
     MapKeyframe q;
     q.t = Time{} + Duration::from_seconds(t_s);
+    q.path_m = kFlown_m;
     q.place.words = {{0, 1.0f}};
     return q;
   }
 
-  PlaceMap map_;
-  CandidateSearch search_{kWords, kForward, 4.0};
+  PlaceMap map_ = forward();
+  CandidateSearch search_{kWords, 4.0};
 };
 
 TEST_F(Search, FindsTheMostSimilarOnesAroundHereThatLookTheSameWay) {
@@ -48,6 +56,15 @@ TEST_F(Search, ReachesFartherWhereThePositionIsUncertain) {
   const KeyframeId far = add(0, Vec3(6, 0, 0), 0, 0.5f);
   EXPECT_TRUE(search_.around(map_, query(100), 0.5).empty());
   EXPECT_EQ(search_.around(map_, query(100), 1.0), std::vector{far});
+}
+
+TEST_F(Search, AFlightThatOnlyLeftAPlaceHasNotComeBackToIt) {
+  const KeyframeId left = add(0, Vec3(2, 0, 0), 0, 0.5f);
+  const KeyframeId of_another = add(10, Vec3(2, 0, 0), 0, 0.4f, 1);
+  map_.find(left)->path_m = map_.find(of_another)->path_m = kFlown_m - 3.9;
+  EXPECT_EQ(search_.around(map_, query(100), 0), std::vector{of_another});
+  map_.find(left)->path_m = kFlown_m - 4.1;
+  EXPECT_EQ(search_.around(map_, query(100), 0), (std::vector{left, of_another}));
 }
 
 TEST_F(Search, NeighboursInTimeAreOnePlaceOfThreeAtMost) {
@@ -93,8 +110,8 @@ BowVector some_words(Rng& rng, int words) {
 TEST(LargeMap, GivesTheMostSimilarOnesAsASmallOneDoes) {
   constexpr int kManyWords = 200, kKeyframes = 6000;
   Rng rng(1);
-  PlaceMap map;
-  CandidateSearch search(kManyWords, kForward, 4.0);
+  PlaceMap map = forward();
+  CandidateSearch search(kManyWords, 4.0);
   for (int i = 0; i < kKeyframes; ++i) {
     MapKeyframe k;
     k.t = Time{} + Duration::from_seconds(10.0 * i);

@@ -85,7 +85,7 @@ std::vector<FeatureTrack> feature_tracks(const PlaceMap& map, const PlaceVerifie
   for (const auto& [earlier, later] : pairs) {
     const MapKeyframe &a = map.keyframes()[earlier], &b = map.keyframes()[later];
     if (query != &b) query = &b, verifier.set_query(b.place);
-    const CameraFromCamera T_ba = (b.T_MB * map.T_BC0).inverse() * (a.T_MB * map.T_BC0);
+    const CameraFromCamera T_ba = map.T_MC(b).inverse() * map.T_MC(a);
     const auto found = verifier.verify(a.place, {T_ba, radius_px});
     if (!found) continue;
     for (const DescriptorMatch& m : found->pose.inliers)

@@ -16,7 +16,7 @@ using namespace test_room;
 /// The true poses of a flight, without loops.
 PlaceMap true_map(int keyframes) {
   PlaceMap map;
-  map.T_BC0 = rig().T_BC0;
+  map.cameras[0] = rig().T_BC0;
   for (Frame& f : flight(room(1), keyframes, 0, 0, 5)) {
     MapKeyframe k;
     k.t = f.t, k.T_GB = f.truth, k.T_MB = Pose<M, B>(f.truth.q, f.truth.p), k.place = std::move(f.place);
@@ -46,7 +46,7 @@ TEST(FeatureTracks, ViewsOfATrackShowOnePoint) {
     for (const FeatureView& v : t) {
       const MapKeyframe& k = map.keyframes()[v.keyframe];
       const PlaceFeature& f = k.place.features[v.feature];
-      const Pose<M, C0> T_MC = k.T_MB * map.T_BC0;
+      const Pose<M, C0> T_MC = map.T_MC(k);
       if (!p_M && f.has_point()) p_M = T_MC * f.p_C0();
       if (!p_M) continue;
       wrong += ((T_MC.inverse() * *p_M).hnormalized() - f.xy()).norm() * kFocal > 15, ++views;

@@ -47,12 +47,10 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
 LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
                        std::unique_ptr<DescriptorStage> stage)
     : options_(options),
-      T_BC0_(rig.T_BC0),
-      extractor_(rig, options.extraction, vocabulary, std::move(stage)),
+      cameras_(rig, options.extraction, vocabulary, std::move(stage)),
       verifier_(verification_for(map, options.verification)),
-      map_(with_body(std::move(map), rig.T_BC0)),
-      search_(vocabulary.words(), rig.T_BC0, options.max_distance_m),
-      drift_(options.drift),
+      map_(with_body(std::move(map), cameras_.T_BC(0))),
+      search_(vocabulary.words(), options.max_distance_m),
       join_(map_),
       follower_(options.follow_mps, options.follow_radps),
       thinning_(options.thin_above, options.max_keyframes, map_) {
@@ -63,19 +61,20 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
   map_.anchored = map_.anchored && !map_.empty();
 }
 
-/// Whether a keyframe would add nothing to the map, in which the flight knows where it is: it shows the newest place, or none,
-/// because the left camera, by which places are recognised, delivers nothing.
-bool LoopCloser::adds_nothing(const Keyframe& keyframe) const {
-  if (!session_.begun || keyframe.reset_counter != session_.reset_counter || !frame_.known()) return false;
-  if (keyframe.images.right && !keyframe.images.left) return true;
-  const MapKeyframe* newest = map_.find(session_.newest);
+/// Whether a keyframe would add nothing to the map, in which the flight knows where it is: it shows the camera's newest place, or
+/// none, because no camera by which places are recognised delivered an image.
+bool LoopCloser::adds_nothing(const Keyframe& keyframe, std::optional<std::size_t> camera) const {
+  if (!session_.has(keyframe) || !frame_.known()) return false;
+  if (!camera) return true;
+  const MapKeyframe* newest = map_.find(session_.newest_of(*camera));
   if (newest == nullptr) return false;
   const Pose<B, B> moved = newest->T_GB.inverse() * keyframe.gauge.T_GB;
   return moved.p.norm() < kSamePlace_m && angle_between(moved.q, Quat::Identity()) < kSamePlace_rad;
 }
 
 MapUpdate LoopCloser::process(const Keyframe& keyframe) {
-  if (adds_nothing(keyframe)) {
+  const std::optional<std::size_t> camera = cameras_.next(keyframe.images);
+  if (adds_nothing(keyframe, camera)) {
     MapUpdate update = begin_update(keyframe);
     advance(keyframe);
     take_anchors(keyframe, update);
@@ -83,56 +82,49 @@ MapUpdate LoopCloser::process(const Keyframe& keyframe) {
     return update;
   }
   CpuTimer timer;
-  Place place = extractor_.extract(keyframe);
+  Place place = cameras_.extract(camera.value_or(0), keyframe);
   const double extract_ms = timer.lap_ms();
-  MapUpdate update = process(std::move(place), keyframe);
+  MapUpdate update = process(std::move(place), keyframe, camera.value_or(0));
   update.stats.extract_ms = extract_ms;
   return update;
 }
 
 void LoopCloser::begin_session(const Keyframe& keyframe) {
-  session_ = {.number = session_.begun ? session_.number + 1 : join_.first_session(),
-              .begun = true,
-              .reset_counter = keyframe.reset_counter,
-              .began_map = map_.empty(),
-              .q_LG = keyframe.gauge.q_LG,
-              .q_LG_newest = keyframe.gauge.q_LG,
-              .up_sigma_rad = keyframe.gauge.up_sigma_rad};
-  drift_.restart();
-  motion_.forget();
+  const std::uint32_t number = session_.begun() ? session_.number() + 1 : join_.first_session();
+  session_ = FlightSession(keyframe, number, map_.empty(), options_.drift, cameras_.size());
   relocaliser_.forget();
   frame_.forget();
-  vertical_.forget();
   follower_.forget();
-  frame_.level(session_.q_LG);
-  if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
+  frame_.level(session_.q_LG());
+  if (map_.empty()) frame_.reset({session_.q_LG(), Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
 }
 
-/// Path, drift and readings up to a keyframe.
+/// Path, drift and readings up to a keyframe, and what they make of the map frame.
 void LoopCloser::advance(const Keyframe& keyframe) {
-  const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
-  const double step_m = session_.gauge ? (T_GB.p - session_.gauge->T_GB.p).norm() : 0;
-  session_.path_m += step_m;
-  session_.gauge = keyframe.gauge;
-  motion_.add(keyframe);
-  drift_.take(keyframe.pose_covariance, keyframe.gauge, session_.path_m);
-  frame_.advance(T_GB, keyframe.t, drift_.rate(), session_.began_map ? 0 : keyframe.scale_sigma);
-  vertical_.advance(drift_over(drift_.rate(), step_m, 0).yaw_rad2);
-  session_.scale.add(keyframe.scale_sigma);
-  const MapKeyframe* newest = map_.find(session_.newest);
-  session_.readings.add(keyframe.imu.segments, keyframe.t, newest ? std::optional(newest->t) : std::nullopt);
+  const MapKeyframe* newest = map_.find(session_.newest());
+  session_.advance(keyframe, newest ? std::optional(newest->t) : std::nullopt);
+  frame_.advance(keyframe.gauge.T_GB, keyframe.t, session_.drift(), session_.began_map() ? 0 : keyframe.scale_sigma);
 }
 
-MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
+MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe, std::size_t camera) {
   advance(keyframe);
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
-  return {{}, keyframe.t, session_.number, T_GB, frame_.T_MG() * T_GB, session_.path_m,
-          0,  0,          frame_.known(),  -1,   std::move(place),     {keyframe.gauge.v_GB, keyframe.imu.bias}};
+  MapKeyframe query;
+  query.t = keyframe.t;
+  query.session = session_.number();
+  query.T_GB = T_GB;
+  query.T_MB = frame_.T_MG() * T_GB;
+  query.path_m = session_.path_m();
+  query.placed = frame_.known();
+  query.camera = map_.camera_at(cameras_.T_BC(camera));
+  query.place = std::move(place);
+  query.motion = {keyframe.gauge.v_GB, keyframe.imu.bias};
+  return query;
 }
 
 MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
   MapUpdate update;
-  if (session_.begun && keyframe.reset_counter == session_.reset_counter) {
+  if (session_.has(keyframe)) {
     update.M_moved = level(keyframe.gauge);
   } else {
     update.M_moved = level_by_newest();  // of the session that ends
@@ -148,9 +140,9 @@ MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
 void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   update.stats.keyframes = static_cast<int>(map_.size());
   update.localised = frame_.known();
-  update.map_session = session_.number;
+  update.map_session = session_.number();
   update.anchored = map_.anchored;
-  update.found = update.localised && !session_.localised && !session_.began_map;
+  update.found = update.localised && !session_.localised && !session_.began_map();
   session_.localised = update.localised;
   if (!update.localised) return;
   update.T_MG = frame_.T_MG();
@@ -158,9 +150,9 @@ void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   update.T_MW_smooth = follower_.follow(to_upright() * update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
 }
 
-MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
+MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe, std::size_t camera) {
   MapUpdate update = begin_update(keyframe);
-  MapKeyframe query = query_of(std::move(place), keyframe);
+  MapKeyframe query = query_of(std::move(place), keyframe, camera);
   CpuTimer timer;
   const std::vector<KeyframeId> candidates = candidates_for(query);
   update.stats.recognise_ms = timer.lap_ms();
@@ -170,7 +162,7 @@ MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
   else relocalise(query, proposals, found);
   update.stats.verify_ms = timer.lap_ms();
   update.stats.candidates = static_cast<int>(candidates.size());
-  add(std::move(query), keyframe.imu, found, update);
+  add(std::move(query), camera, keyframe.imu, found, update);
   take_tags(keyframe, update);
   take_anchors(keyframe, update);
   if (optimisation_due()) optimise(update);
@@ -183,9 +175,6 @@ MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
 std::vector<KeyframeId> LoopCloser::candidates_for(const MapKeyframe& query) {
   return frame_.known() ? search_.around(map_, query, position_sigma_m(frame_.covariance())) : search_.anywhere(map_, query);
 }
-
-/// Whether the flight's lengths are not those of the map, which it did not begin.
-bool LoopCloser::needs_scale() const { return !session_.began_map && session_.scale.sigma() > 0; }
 
 /// Length in M of what the flight and this keyframe measure together as 1 m.
 double LoopCloser::metres_with(const MapKeyframe& k) const {
@@ -204,13 +193,12 @@ std::vector<LoopCloser::Proposal> LoopCloser::look_at(const MapKeyframe& query, 
     const MapKeyframe& k = *map_.find(id);
     std::optional<VerifiedPose> verified;
     if (frame_.known() && radius_px < kWidestPrediction_px) {
-      const Pose<M, C0> T_MQ = query.T_MB * T_BC0_, T_MK = k.T_MB * T_BC0_;
-      verified = verifier_.verify(*map_.place_of(k), {T_MQ.inverse() * T_MK, radius_px});
+      verified = verifier_.verify(*map_.place_of(k), {map_.T_MC(query).inverse() * map_.T_MC(k), radius_px});
     } else {
       verified = verifier_.verify(*map_.place_of(k));
     }
     if (!verified) continue;
-    const MapEdge edge = loop_edge(T_BC0_, id, verified->pose);
+    const MapEdge edge = loop_edge(map_.T_BC(k), map_.T_BC(query), id, verified->pose);
     proposals.push_back({id, std::move(*verified), edge});
   }
   return proposals;
@@ -220,11 +208,11 @@ std::vector<LoopCloser::Proposal> LoopCloser::look_at(const MapKeyframe& query, 
 bool LoopCloser::take(const MapKeyframe& k, MeasuredPose seen) {
   // The error that different roll and pitch cause through the lever arm is not drift.
   double tilt_variance = kMapTilt_rad * kMapTilt_rad;
-  if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
+  if (k.session != session_.number()) tilt_variance += session_.up_sigma_rad() * session_.up_sigma_rad();
   seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
   if (frame_.mahalanobis2(seen) > options_.gate_sigma * options_.gate_sigma) return false;
-  if (k.session != session_.number) vertical_.add(*session_.gauge, seen);
-  if (k.session == session_.number || needs_scale()) seen.covariance *= kSharedError;
+  if (k.session != session_.number()) session_.see(seen);
+  if (k.session == session_.number() || session_.needs_scale()) seen.covariance *= kSharedError;
   frame_.update(seen);
   return true;
 }
@@ -238,7 +226,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
       session_.confirmed = true;
     } else if (!find_again(query, proposal, seen)) {
       ++update.stats.refused;
-      join_.note_refused(session_.number, 1);
+      join_.note_refused(session_.number(), 1);
       continue;
     }
     found.push_back(proposal.edge);
@@ -251,8 +239,8 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
 /// The first places that a flight of one camera recognises have depths of a poor scale, and so has where they put it. Until a
 /// place confirms that, others may find it anew.
 bool LoopCloser::find_again(MapKeyframe& query, const Proposal& proposal, const MeasuredPose& seen) {
-  if (session_.confirmed || !needs_scale()) return false;
-  const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
+  if (session_.confirmed || !session_.needs_scale()) return false;
+  const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG(), seen.T_MB, proposal.verified);
   if (T_MG) found_at(*T_MG, seen);
   return T_MG.has_value();
 }
@@ -260,7 +248,7 @@ bool LoopCloser::find_again(MapKeyframe& query, const Proposal& proposal, const 
 void LoopCloser::found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen) {
   frame_.reset(T_MG, kFoundSigma_m, kFoundSigma_rad);
   frame_.update(seen);
-  vertical_.add(*session_.gauge, seen);
+  session_.see(seen);
   join_session(frame_.T_MG());
 }
 
@@ -268,7 +256,7 @@ void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& pro
   for (const Proposal& proposal : proposals) {
     const MapKeyframe& k = *map_.find(proposal.candidate);
     const MeasuredPose seen = measured_pose(k, proposal.edge, metres_with(k));
-    const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
+    const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG(), seen.T_MB, proposal.verified);
     if (!T_MG) continue;
     found_at(*T_MG, seen);
     query.T_MB = frame_.T_MG() * query.T_GB;
@@ -281,27 +269,28 @@ void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& pro
 /// Gives the session's keyframes from before the relocalisation their poses in M.
 void LoopCloser::join_session(const Pose<M, G>& T_MG) {
   for (MapKeyframe& k : map_.keyframes())
-    if (k.session == session_.number) k.T_MB = T_MG * k.T_GB, k.placed = true;
+    if (k.session == session_.number()) k.T_MB = T_MG * k.T_GB, k.placed = true;
   relocaliser_.forget();
 }
 
 /// From the newest keyframe of the map to `t`; null where readings are missing on the way, or keyframes in between.
-void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update) {
+void LoopCloser::add(MapKeyframe query, std::size_t camera, const KeyframeImu& imu, const std::vector<MapEdge>& found,
+                     MapUpdate& update) {
   std::optional<MapEdge> odometry;
-  if (const MapKeyframe* previous = map_.find(session_.newest); previous != nullptr) {
-    odometry = odometry_edge(*previous, query.T_GB, query.t, drift_.rate());
-    if (odometry) odometry->imu = session_.readings.until(query.t, previous->t, imu);
+  if (const MapKeyframe* previous = map_.find(session_.newest()); previous != nullptr) {
+    odometry = odometry_edge(*previous, query.T_GB, query.t, session_.drift());
+    if (odometry) odometry->imu = session_.readings_until(query.t, previous->t, imu);
   }
-  session_.readings.restart();
+  session_.restart_readings();
   const std::size_t size_before = map_.size();
   const Time t = query.t;
   const BowVector words = query.place.words;
-  MapSession& session = map_.session(session_.number, t);
+  MapSession& session = map_.session(session_.number(), t);
   session.ended = t;
-  session.scale_sigma = session_.scale.sigma();
+  session.scale_sigma = session_.scale_sigma();
   ++session.keyframes;
   session.loops += static_cast<int>(
-      std::ranges::count_if(found, [&](const MapEdge& e) { return map_.find(e.from)->session != session_.number; }));
+      std::ranges::count_if(found, [&](const MapEdge& e) { return map_.find(e.from)->session != session_.number(); }));
   const KeyframeId id = map_.add(std::move(query));
   search_.add(id, words);
   if (odometry) odometry->to = id, map_.edges.push_back(*odometry);
@@ -313,7 +302,7 @@ void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vecto
   news_since_optimised_ += static_cast<int>(found.size());
   thinning_.note(id, found, size_before);
   flight_.add(t, id);
-  session_.newest = id;
+  session_.added(id, camera);
 }
 
 bool LoopCloser::optimisation_due() const {
@@ -339,10 +328,10 @@ PoseGraphReport LoopCloser::optimise_graph() {
 void LoopCloser::optimise(MapUpdate& update) {
   optimise_graph();
   news_since_optimised_ = 0;
-  if (const MapKeyframe* newest = map_.find(session_.newest); newest != nullptr && frame_.known()) {
+  if (const MapKeyframe* newest = map_.find(session_.newest()); newest != nullptr && frame_.known()) {
     const Mat4 P = frame_.covariance();
     frame_.reset(newest->T_MB * newest->T_GB.inverse(), std::sqrt(P.topLeftCorner<3, 3>().trace() / 3), std::sqrt(P(3, 3)));
-    if (!session_.began_map) frame_.set_log_scale(map_.log_scale_of(session_.number));
+    if (!session_.began_map()) frame_.set_log_scale(map_.log_scale_of(session_.number()));
   }
   update.stats.optimised = true;
   for (const MapKeyframe& k : map_.keyframes()) update.corrected.push_back({k.id, k.t, k.T_MB});

@@ -21,16 +21,12 @@
 #include "fbvins/loop/candidate_search.hpp"
 #include "fbvins/loop/flight_join.hpp"
 #include "fbvins/loop/flight_keyframes.hpp"
-#include "fbvins/loop/flight_scale.hpp"
+#include "fbvins/loop/flight_session.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_frame.hpp"
-#include "fbvins/loop/odometry_drift.hpp"
-#include "fbvins/loop/place_extractor.hpp"
+#include "fbvins/loop/place_cameras.hpp"
 #include "fbvins/loop/place_map.hpp"
 #include "fbvins/loop/place_verifier.hpp"
-#include "fbvins/loop/place_vertical.hpp"
-#include "fbvins/loop/readings_since.hpp"
-#include "fbvins/loop/recent_motion.hpp"
 #include "fbvins/loop/relocaliser.hpp"
 #include "fbvins/loop/thinning.hpp"
 #include "fbvins/types/mapper.hpp"
@@ -48,8 +44,9 @@ class LoopCloser final : public Mapper {
              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
   MapUpdate process(const Keyframe& keyframe) override;
-  /// The same from features already extracted (joining maps, replay); the images are not used.
-  MapUpdate process(Place place, const Keyframe& keyframe);
+  /// The same from features already extracted (joining maps, replay), of one of the cameras that see places; the images are not
+  /// used.
+  MapUpdate process(Place place, const Keyframe& keyframe, std::size_t camera = 0);
 
   /// Last optimisation of the pose graph. In an older map, what the flight makes superfluous leaves it then.
   PoseGraphReport finish();
@@ -67,30 +64,13 @@ class LoopCloser final : public Mapper {
   Trajectory<M> corrected(const Trajectory<G>& in_G) const { return flight_.corrected(map_, in_G); }
 
  private:
-  /// The part of the flight in the odometry's present gauge: since its last restart.
-  struct Session {
-    std::uint32_t number = 0;  ///< counts the sessions of this map
-    bool begun = false;
-    std::uint32_t reset_counter = 0;
-    bool began_map = false;  ///< M is its gauge, aligned with gravity
-    bool localised = false;
-    bool confirmed = false;        ///< a place was where it is expected to be since the flight was found in an older map
-    Quat q_LG = Quat::Identity();  ///< by which M, or the flight in an older one, is level
-    Quat q_LG_newest = Quat::Identity();
-    double up_sigma_rad = 0;  ///< of the vertical, by gravity and places
-    KeyframeId newest = {};
-    std::optional<GaugeState> gauge = {};  ///< of the last keyframe that was handed in
-    double path_m = 0;
-    ReadingsSince readings = {};  ///< the newest keyframe of the map
-    FlightScale scale = {};
-  };
   struct Proposal {
     KeyframeId candidate;
     VerifiedPose verified;
     MapEdge edge;
   };
 
-  bool adds_nothing(const Keyframe& keyframe) const;
+  bool adds_nothing(const Keyframe& keyframe, std::optional<std::size_t> camera) const;
   MapUpdate begin_update(const Keyframe& keyframe);
   void end_update(const Keyframe& keyframe, MapUpdate& update);
   void begin_session(const Keyframe& keyframe);
@@ -98,9 +78,8 @@ class LoopCloser final : public Mapper {
   Pose<M, M> to_upright() const;
   std::optional<Pose<M, M>> level_by_newest();
   void advance(const Keyframe& keyframe);
-  MapKeyframe query_of(Place place, const Keyframe& keyframe);
+  MapKeyframe query_of(Place place, const Keyframe& keyframe, std::size_t camera);
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
-  bool needs_scale() const;
   double metres_with(const MapKeyframe& k) const;
   std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
   void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
@@ -109,7 +88,7 @@ class LoopCloser final : public Mapper {
   void found_at(const Pose<M, G>& T_MG, const MeasuredPose& seen);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
   void join_session(const Pose<M, G>& T_MG);
-  void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
+  void add(MapKeyframe query, std::size_t camera, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
   void take_anchors(const Keyframe& keyframe, MapUpdate& update);
   void take_tags(const Keyframe& keyframe, MapUpdate& update);
   std::optional<MapTag> tag_of_newest(const TagAnchor& anchor) const;
@@ -125,21 +104,17 @@ class LoopCloser final : public Mapper {
   void upkeep();
 
   LoopOptions options_;
-  Pose<B, C0> T_BC0_;
-  PlaceExtractor extractor_;
+  PlaceCameras cameras_;
   PlaceVerifier verifier_;
   PlaceMap map_;
   CandidateSearch search_;
-  OdometryDrift drift_;
   FlightJoin join_;
   MapFrame frame_;
-  PlaceVertical vertical_;
   MapFrameFollower follower_;
   Relocaliser relocaliser_;
   Thinning thinning_;
   FlightKeyframes flight_;
-  RecentMotion motion_;
-  Session session_;
+  FlightSession session_;
   int news_since_optimised_ = 0;                                 ///< loops, and keyframes with anchors
   std::optional<std::map<std::uint32_t, std::string>> verdict_;  ///< of finish()
 };

@@ -142,7 +142,7 @@ TEST(TagLandmarks, ViewsAreHandedOnWithTheirKeyframes) {
   EXPECT_NE(map.tags.back().keyframe, last.keyframe);
   EXPECT_LT((in_M(map.tags.back()) - before).norm(), 0.01);
   EXPECT_GT(map.tags.back().covariance.trace(), last.covariance.trace());
-  change_body(map, {map.T_BC0.q, Vec3(0.1, 0.2, 0.3)});
+  change_body(map, {map.cameras[0].q, Vec3(0.1, 0.2, 0.3)});
   EXPECT_LT((in_M(map.tags.back()) - before).norm(), 0.01) << "the tag hangs where it hung";
   take_out_sessions(map, {0});
   EXPECT_TRUE(map.tags.empty());

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/loop_map.hpp"
 
-#include <algorithm>
-
-#include "fbvins/camera/group_images.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/features/booster.hpp"
 #include "fbvins/loop/loop_closer.hpp"
@@ -14,22 +11,9 @@
 #include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins {
-namespace {
-
-/// Whose places a map has, where they are not the whole rig: the first two that see the same things, or the first camera.
-std::optional<CameraGroup> recognising(const StereoRig& rig) {
-  if (rig.camera_count() == 1) return std::nullopt;
-  const std::vector<CameraGroup> groups = camera_groups(rig);
-  const auto pair = std::ranges::find_if(groups, [](const CameraGroup& group) { return group.second.has_value(); });
-  if (pair == groups.end()) return groups.front();
-  return rig.more.empty() ? std::nullopt : std::optional(*pair);
-}
-
-}  // namespace
 
 Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const MapOptions& options) {
   if (Result<void> valid = validate(options.loop); !valid) return valid.error();
-  const std::optional<CameraGroup> cameras = recognising(rig);
   Result<PlaceMap> map = PlaceMap{};
   constexpr std::uint64_t kMB = 1'000'000;
   if (!options.file.empty()) map = open_map(options.file, kMB * static_cast<std::uint64_t>(options.loop.memory_mb));
@@ -42,25 +26,17 @@ Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const Map
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (map->boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return stage.error();
-  auto closer = std::make_unique<LoopCloser>(cameras ? rig_of(rig, *cameras) : rig, options.loop, std::move(*vocabulary),
-                                             std::move(*map), std::move(*stage));
-  return std::unique_ptr<LoopMap>(new LoopMap(std::move(closer), cameras));
+  auto closer = std::make_unique<LoopCloser>(rig, options.loop, std::move(*vocabulary), std::move(*map), std::move(*stage));
+  return std::unique_ptr<LoopMap>(new LoopMap(std::move(closer)));
 }
 
-LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> cameras)
-    : closer_(std::move(closer)), journal_(std::make_unique<MapJournal>()), cameras_(cameras) {}
+LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer) : closer_(std::move(closer)), journal_(std::make_unique<MapJournal>()) {}
 LoopMap::~LoopMap() = default;
 
-MapUpdate LoopMap::process(const Keyframe& keyframe) {
-  if (!cameras_) return closer_->process(keyframe);
-  Keyframe of_cameras = keyframe;
-  of_cameras.images = images_of(keyframe.images, *cameras_);
-  return closer_->process(of_cameras);
-}
+MapUpdate LoopMap::process(const Keyframe& keyframe) { return closer_->process(keyframe); }
 void LoopMap::take_over(std::unique_ptr<LoopMap> other) {
   closer_ = std::move(other->closer_);
   journal_ = std::move(other->journal_);
-  cameras_ = other->cameras_;
 }
 PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }

@@ -10,6 +10,9 @@ namespace {
 
 /// Factor on the covariance of loops: there are many, and they are not quite independent of one another.
 constexpr double kLoopInflation = 2.0;
+/// The covariance of a loop between views this far apart is doubled, and grows with the square of the distance: what is seen from
+/// afar changes little on the way, so that many loops in a row err alike (L38).
+constexpr double kAlike_m = 0.7;
 /// No loop is more certain than this.
 constexpr double kLoopFloor_m = 0.006, kLoopFloor_rad = 0.10 * kDegree;
 /// Nor is an odometry edge, as variances: two keyframes may have the same position.
@@ -32,7 +35,8 @@ MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, c
 }
 
 /// T_BcBq with the covariance of (dp in the candidate's body, dtheta in the query's), from the cameras' T_qc.
-MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose) {
+MapEdge loop_edge(const Pose<B, C0>& T_BC_candidate, const Pose<B, C0>& T_BC_query, KeyframeId candidate,
+                  const RelativePose& pose) {
   const CameraFromCamera& T_qc = pose.T_qc;
   const Pose<B, B> T_cq(T_qc.inverse().q, T_qc.inverse().p);  // of cameras, though the types say bodies: see the formulas
   Mat6 J = Mat6::Zero();
@@ -40,12 +44,13 @@ MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const Relative
   J.topRightCorner<3, 3>() = hat(T_cq.p);
   J.bottomRightCorner<3, 3>() = -T_qc.R();
   const Mat6 cov_cq = kLoopInflation * J * pose.information.inverse() * J.transpose();
-  const Pose<B, B> T_BC(T_BC0.q, T_BC0.p);
-  Mat6 cov = compose_covariance(T_BC, Mat6::Zero(), T_cq, cov_cq);
-  cov = compose_covariance(T_BC * T_cq, cov, T_BC.inverse(), Mat6::Zero());
+  const Pose<B, B> T_BCc(T_BC_candidate.q, T_BC_candidate.p), T_CqB(T_BC_query.cast_frames<B, B>().inverse());
+  Mat6 cov = compose_covariance(T_BCc, Mat6::Zero(), T_cq, cov_cq);
+  cov = compose_covariance(T_BCc * T_cq, cov, T_CqB, Mat6::Zero());
+  cov *= 1 + T_cq.p.squaredNorm() / (kAlike_m * kAlike_m);
   cov.diagonal().head<3>().array() += kLoopFloor_m * kLoopFloor_m;
   cov.diagonal().tail<3>().array() += kLoopFloor_rad * kLoopFloor_rad;
-  return {candidate, {}, T_BC * T_cq * T_BC.inverse(), symmetric(cov.inverse()), MapEdge::Kind::loop, nullptr};
+  return {candidate, {}, T_BCc * T_cq * T_CqB, symmetric(cov.inverse()), MapEdge::Kind::loop, nullptr};
 }
 
 MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge, double metre) {

@@ -2,7 +2,7 @@
 // Edges of the map from what was measured: the odometry between two keyframes, or a recognised place; and the pose of the body
 // in M that a recognised place implies (docs/derivations/loop.md, L13). Pure functions.
 //
-//   MapEdge edge = loop_edge(T_BC0, candidate.id, verified.pose);
+//   MapEdge edge = loop_edge(map.T_BC(candidate), map.T_BC(query), candidate.id, verified.pose);
 //   if (frame.mahalanobis2(measured_pose(candidate, edge)) < gate) map.edges.push_back(edge);
 #pragma once
 
@@ -19,7 +19,8 @@ double angle_between(const Quat& a, const Quat& b);
 MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, const DriftOptions& drift);
 
 /// From the candidate to the query's body; `to` is left open. `pose`: of the candidate's camera in the query's.
-MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose);
+MapEdge loop_edge(const Pose<B, C0>& T_BC_candidate, const Pose<B, C0>& T_BC_query, KeyframeId candidate,
+                  const RelativePose& pose);
 
 /// Pose in M of the body at the end of `edge`, whose metre has this length in M, from that of `from`.
 MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge, double metre = 1);

@@ -42,7 +42,7 @@ TEST(LoopEdge, IsThePoseOfTheBodyAndPutsItWhereItIs) {
   RelativePose pose;
   pose.T_qc = (T_MB_query * kCamera).inverse() * (candidate.T_MB * kCamera);
   pose.information = 1e4 * Mat6::Identity();
-  const MapEdge edge = loop_edge(kCamera, candidate.id, pose);
+  const MapEdge edge = loop_edge(kCamera, kCamera, candidate.id, pose);
   EXPECT_EQ(edge.from, candidate.id);
   EXPECT_EQ(edge.kind, MapEdge::Kind::loop);
   EXPECT_LT(((candidate.T_MB * edge.T_from_to).p - T_MB_query.p).norm(), 1e-9);
@@ -59,7 +59,7 @@ TEST(LoopEdge, ItsCovarianceIsThatOfTheCamerasTwiceOver) {
   Vec6 sigma;
   sigma << 0.02, 0.03, 0.02, 0.01, 0.02, 0.015;
   pose.information = Mat6(sigma.cwiseAbs2().cwiseInverse().asDiagonal());
-  const MapEdge edge = loop_edge(kCamera, {}, pose);
+  const MapEdge edge = loop_edge(kCamera, kCamera, {}, pose);
   Rng rng(2);
   Mat6 sampled = Mat6::Zero();
   constexpr int kSamples = 20000;
@@ -68,7 +68,7 @@ TEST(LoopEdge, ItsCovarianceIsThatOfTheCamerasTwiceOver) {
     for (int j = 0; j < 6; ++j) d[j] = std::numbers::sqrt2 * sigma[j] * rng.normal();
     RelativePose disturbed = pose;
     disturbed.T_qc = pose.T_qc.boxplus(d.head<3>(), d.tail<3>());
-    const Pose<B, B> T = loop_edge(kCamera, {}, disturbed).T_from_to;
+    const Pose<B, B> T = loop_edge(kCamera, kCamera, {}, disturbed).T_from_to;
     Vec6 e;
     e << T.p - edge.T_from_to.p, so3_log(edge.T_from_to.q.conjugate() * T.q);
     sampled += e * e.transpose() / kSamples;
@@ -80,7 +80,7 @@ TEST(LoopEdge, ItsCovarianceIsThatOfTheCamerasTwiceOver) {
 TEST(LoopEdge, NoLoopIsCertain) {
   RelativePose pose;
   pose.information = 1e12 * Mat6::Identity();
-  const Mat6 covariance = loop_edge(kCamera, {}, pose).information.inverse();
+  const Mat6 covariance = loop_edge(kCamera, kCamera, {}, pose).information.inverse();
   EXPECT_GT(std::sqrt(covariance(0, 0)), 0.005);
   EXPECT_GT(std::sqrt(covariance(5, 5)), 0.0015);
 }

@@ -31,7 +31,7 @@ Result<PlaceMap> parse_version_1(std::string_view bytes, const std::string& name
   map.boosted = (flags & kMapBoosted) != 0;
   map.anchored = (flags & kMapAnchored) != 0;
   const auto keyframes = in.get<std::uint32_t>(), edges = in.get<std::uint32_t>();
-  map.T_BC0 = in.pose<Pose<B, C0>>();
+  map.cameras[0] = in.pose<Pose<B, C0>>();
   KeyframeId last;
   for (std::uint32_t i = 0; i < keyframes && in.ok(); ++i) {
     std::uint32_t features = 0;
@@ -117,7 +117,7 @@ std::string map_as_ply(const PlaceMap& map) {
   std::string points;
   std::size_t count = 0;
   for (const MapKeyframe& k : map.keyframes()) {
-    const Pose<M, C0> T_MC = k.T_MB * map.T_BC0;
+    const Pose<M, C0> T_MC = map.T_MC(k);
     for (const PlaceFeature& f : k.place.features) {
       if (!f.has_point() || f.sigma_inverse_depth > kMaxRelativeSigma * f.inverse_depth) continue;
       const Vec3 p = T_MC * f.p_C0();

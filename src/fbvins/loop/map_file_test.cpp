@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 PlaceMap map_of(int keyframes, std::uint64_t seed) {
   Rng rng(seed);
   PlaceMap map;
-  map.T_BC0 = {so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.01, 0.02, 0.03)};
+  map.cameras[0] = {so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.01, 0.02, 0.03)};
   for (int i = 0; i < keyframes; ++i) {
     MapKeyframe k;
     k.t = Time{1000 * i};
@@ -75,6 +75,29 @@ TEST_F(MapFile, WhatWasSavedIsLoadedBitForBit) {
   ASSERT_TRUE(loaded.ok()) << loaded.error().message;
   EXPECT_EQ(serialise_map(*loaded), serialise_map(map));
   EXPECT_EQ(loaded->keyframes()[7].place.features, map.keyframes()[7].place.features);
+}
+
+/// Each third place was seen by another camera.
+PlaceMap of_two_cameras(PlaceMap map) {
+  const std::uint16_t other = map.camera_at({so3_exp(Vec3(0, 0, 3)), Vec3(-0.1, 0, 0)});
+  for (std::size_t i = 1; i < map.size(); i += 3) map.keyframes()[i].camera = other;
+  return map;
+}
+
+TEST_F(MapFile, RemembersWhichCameraSawEachPlace) {
+  const PlaceMap map = of_two_cameras(anchored_map_of(10, 1));
+  ASSERT_TRUE(save_map(map, path_).ok());
+  const auto loaded = load_map(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.error().message;
+  EXPECT_EQ(serialise_map(*loaded), serialise_map(map));
+  for (std::size_t i = 0; i < map.size(); ++i)
+    EXPECT_EQ(loaded->T_BC(loaded->keyframes()[i]).p, map.T_BC(map.keyframes()[i]).p) << i;
+}
+
+TEST_F(MapFile, ACameraThatIsNotThereIsDamage) {
+  PlaceMap map = of_two_cameras(map_of(10, 1));
+  map.keyframes()[9].camera = 2;
+  EXPECT_FALSE(parse_map(view(serialise_map(map)), "m").ok());
 }
 
 TEST_F(MapFile, RemembersWhichDescriptorsItHolds) {

@@ -76,7 +76,7 @@ Result<PlaceMap> read_front(std::shared_ptr<ByteSource> file, const std::string&
   map.anchored = (flags & kMapAnchored) != 0;
   const auto keyframes = in.get<std::uint32_t>(), edges = in.get<std::uint32_t>();
   map.vocabulary = in.get<std::uint64_t>();
-  map.T_BC0 = in.pose<Pose<B, C0>>();
+  map.cameras[0] = in.pose<Pose<B, C0>>();
   const std::uint64_t places_end = get_keyframes(in, keyframes, map, places);
   get_rest(in, edges, flags, map);
   get_missed(in, flags, map);

@@ -87,7 +87,8 @@ struct Difference {
 
 std::optional<Difference> difference(const PlaceMap& map, const MapBase& base) {
   Difference d;
-  const bool other_body = map.T_BC0.p != base.T_BC0.p || map.T_BC0.q.coeffs() != base.T_BC0.q.coeffs();
+  const Pose<B, C0>& first = map.cameras[0];
+  const bool other_body = first.p != base.T_BC0.p || first.q.coeffs() != base.T_BC0.q.coeffs();
   auto in_file = base.keyframes.begin();
   for (const MapKeyframe& k : map.keyframes()) {
     if (in_file == base.keyframes.end()) {
@@ -205,7 +206,7 @@ Result<void> apply(BytesIn& in, const ByteSource& journal, const Blocks& blocks,
 }  // namespace
 
 std::shared_ptr<const MapBase> base_of(const PlaceMap& map, const ByteSource& file) {
-  MapBase base{identity_of(file), map.T_BC0, {}, map.edges.size()};
+  MapBase base{identity_of(file), map.cameras[0], {}, map.edges.size()};
   for (const MapKeyframe& k : map.keyframes()) base.keyframes.push_back({k.id, k.T_MB, k.loops_ending_here});
   return std::make_shared<const MapBase>(std::move(base));
 }
@@ -222,7 +223,7 @@ Result<std::string> MapJournal::news(const PlaceMap& map) {
   BytesOut state;
   state.put(flags_of(map, rest));
   state.put(map.vocabulary);
-  state.put(map.T_BC0);
+  state.put(map.cameras[0]);
   put_changed(state, d->changed);
   state.put(static_cast<std::uint32_t>(d->added.size()));
   in_use_ = kHeaderBytes;

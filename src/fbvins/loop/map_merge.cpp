@@ -58,12 +58,12 @@ struct Tie {
 
 class Merge {
  public:
-  /// Both in the body of the first's rig, with words.
+  /// Both in the body of the first's rig, with words and one numbering of cameras.
   Merge(const PlaceMap& first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary)
       : first_(first),
         second_(second),
         verifier_(first.boosted ? for_boosted(options.verification) : options.verification),
-        search_(vocabulary.words(), first.T_BC0, options.max_distance_m) {
+        search_(vocabulary.words(), options.max_distance_m) {
     for (const MapKeyframe& k : first.keyframes()) search_.add(k.id, k.place.words);
   }
 
@@ -103,7 +103,7 @@ class Merge {
       verifier_.set_query(query.place);
       for (const KeyframeId id : search_.around(first_, query, kKnown_m)) {
         const MapKeyframe& known = *first_.find(id);
-        const CameraFromCamera T_qc = (query.T_MB * first_.T_BC0).inverse() * (known.T_MB * first_.T_BC0);
+        const CameraFromCamera T_qc = first_.T_MC(query).inverse() * first_.T_MC(known);
         if (const auto verified = verifier_.verify(known.place, {T_qc, kKnown_px}))
           out.push_back(tie_of(known, query, *verified).edge);
       }
@@ -115,7 +115,7 @@ class Merge {
   static constexpr std::uint32_t kNoSession = 0xffffffff;
 
   Tie tie_of(const MapKeyframe& known, const MapKeyframe& query, const VerifiedPose& verified) const {
-    MapEdge edge = loop_edge(first_.T_BC0, known.id, verified.pose);
+    MapEdge edge = loop_edge(first_.T_BC(known), first_.T_BC(query), known.id, verified.pose);
     edge.to = query.id;
     return tie_by(std::move(edge), known, query);
   }
@@ -220,7 +220,9 @@ Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& other, const LoopOpt
   if (both.size() > kMostInBoth * static_cast<double>(second.size()))
     return refuse(fmt::format("{} of its {} keyframes are in the other map already", both.size(), second.size()));
   for (const KeyframeId id : both) second.remove(id);  // where recordings of one flight overlap
-  change_body(second, first.T_BC0);
+  change_body(second, first.cameras[0]);
+  for (MapKeyframe& k : second.keyframes()) k.camera = first.camera_at(second.T_BC(k));
+  second.cameras = first.cameras;
   for (PlaceMap* map : {&first, &second}) {
     std::erase_if(map->keyframes(), [](const MapKeyframe& k) { return !k.placed; });
     std::erase_if(map->edges, [&](const MapEdge& e) { return map->find(e.from) == nullptr || map->find(e.to) == nullptr; });

@@ -16,6 +16,7 @@ namespace {
 
 static_assert(sizeof(PlaceFeature) == 20 && sizeof(Descriptor) == 32 && sizeof(BowEntry) == 8);
 constexpr std::size_t kLongestName = 200;
+constexpr std::uint32_t kMostFurtherCameras = 0xffff;
 constexpr double kLargestScale = 2;  // as a logarithm, and as a standard deviation
 
 void put_information(BytesOut& out, const Mat6& information) {
@@ -92,6 +93,18 @@ std::string get_name(BytesIn& in) {
   std::string name(in.ok() ? n : 0, '\0');
   in.raw(name.data(), name.size());
   return name;
+}
+
+void get_cameras(BytesIn& in, PlaceMap& map) {
+  const auto further = in.get<std::uint32_t>();
+  in.check(further > 0 && further <= kMostFurtherCameras);
+  map.cameras.resize(1);
+  for (std::uint32_t i = 0; i < further && in.ok(); ++i) map.cameras.push_back(in.pose<Pose<B, C0>>());
+  for (MapKeyframe& k : map.keyframes()) {
+    const auto camera = in.get<std::uint16_t>();
+    in.check(camera < map.cameras.size());
+    if (in.ok()) k.camera = camera;
+  }
 }
 
 /// Sessions that have a place in M, and those of which no keyframe is left.
@@ -218,6 +231,11 @@ MapRest rest_of(const PlaceMap& map) {
     if (kept.count(a.keyframe) > 0) rest.anchors.push_back(&a);
   for (const MapTag& t : map.tags)
     if (kept.count(t.keyframe) > 0) rest.tags.push_back(&t);
+  rest.cameras.assign(map.cameras.begin() + 1, map.cameras.end());
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.placed) rest.seen_by.push_back(k.camera);
+  if (std::ranges::all_of(rest.seen_by, [](std::uint16_t camera) { return camera == 0; }))
+    rest.cameras.clear(), rest.seen_by.clear();
   rest.sessions = remembered(map);
   if (rest.sessions.size() == 1 && !have_scales(rest.sessions)) rest.sessions.clear();
   return rest;
@@ -226,7 +244,7 @@ MapRest rest_of(const PlaceMap& map) {
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest) {
   return (map.boosted ? kMapBoosted : 0) | (rest.name.empty() ? 0 : kMapNamed) | (rest.anchors.empty() ? 0 : kMapAnchors) |
          (map.anchored ? kMapAnchored : 0) | (rest.sessions.empty() ? 0 : kMapMemory) | (rest.tags.empty() ? 0 : kMapTags) |
-         (have_scales(rest.sessions) ? kMapScales : 0);
+         (have_scales(rest.sessions) ? kMapScales : 0) | (rest.cameras.empty() ? 0 : kMapCameras);
 }
 
 void put_rest(BytesOut& out, const MapRest& rest) {
@@ -240,9 +258,14 @@ void put_rest(BytesOut& out, const MapRest& rest) {
     for (const MapAnchor* a : rest.anchors) put_anchor(out, *a);
   }
   if (!rest.sessions.empty()) put_sessions(out, rest.sessions);
-  if (rest.tags.empty()) return;
-  out.put(static_cast<std::uint32_t>(rest.tags.size()));
-  for (const MapTag* t : rest.tags) put_tag(out, *t);
+  if (!rest.tags.empty()) {
+    out.put(static_cast<std::uint32_t>(rest.tags.size()));
+    for (const MapTag* t : rest.tags) put_tag(out, *t);
+  }
+  if (rest.cameras.empty()) return;
+  out.put(static_cast<std::uint32_t>(rest.cameras.size()));
+  for (const Pose<B, C0>& T_BC : rest.cameras) out.put(T_BC);
+  for (const std::uint16_t camera : rest.seen_by) out.put(camera);
 }
 
 void put_missed(BytesOut& out, const PlaceMap& map) {
@@ -272,6 +295,7 @@ void get_rest(BytesIn& in, std::uint32_t edges, std::uint32_t flags, PlaceMap& m
     in.check(map.find(t.keyframe) != nullptr);
     if (in.ok()) map.tags.push_back(t);
   }
+  if (in.ok() && (flags & kMapCameras) != 0) get_cameras(in, map);
 }
 
 void get_missed(BytesIn& in, std::uint32_t flags, PlaceMap& map) {

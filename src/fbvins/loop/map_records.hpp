@@ -25,11 +25,12 @@ std::uint64_t map_checksum(std::string_view bytes);
 Error damaged_map(const std::string& name, std::string_view what);
 
 /// Flags: descriptors are boosted; a name follows the edges, and anchors follow it; M is their frame; what is remembered of
-/// sessions comes then, and tags that are landmarks; of sessions their scales are remembered.
+/// sessions comes then, and tags that are landmarks; of sessions their scales are remembered; several cameras saw the places,
+/// which comes last.
 inline constexpr std::uint32_t kMapBoosted = 1, kMapNamed = 2, kMapAnchors = 4, kMapAnchored = 8, kMapMemory = 16, kMapTags = 32,
-                               kMapScales = 64;
+                               kMapScales = 64, kMapCameras = 128;
 inline constexpr std::uint32_t kMapFlags =
-    kMapBoosted | kMapNamed | kMapAnchors | kMapAnchored | kMapMemory | kMapTags | kMapScales;
+    kMapBoosted | kMapNamed | kMapAnchors | kMapAnchored | kMapMemory | kMapTags | kMapScales | kMapCameras;
 
 /// Bytes of a feature with its descriptor.
 inline constexpr std::size_t kFeatureBytes = sizeof(PlaceFeature) + sizeof(Descriptor);
@@ -50,7 +51,9 @@ struct MapRest {
   std::string name;
   std::vector<const MapAnchor*> anchors;
   std::vector<const MapTag*> tags;
-  std::vector<MapSession> sessions;  ///< none where there is one only, which its keyframes show, and that is metric
+  std::vector<MapSession> sessions;    ///< none where there is one only, which its keyframes show, and that is metric
+  std::vector<Pose<B, C0>> cameras;    ///< but the first
+  std::vector<std::uint16_t> seen_by;  ///< of each keyframe; none where the first camera saw all
 };
 MapRest rest_of(const PlaceMap& map);
 std::uint32_t flags_of(const PlaceMap& map, const MapRest& rest);

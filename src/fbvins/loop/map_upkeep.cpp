@@ -27,10 +27,6 @@ constexpr double kSpot_m = 0.15, kSpot_rad = 8 * kDegree;
 /// Around where the poses predict a point.
 constexpr double kSearch_px = 30;
 
-bool within(const MapKeyframe& a, const MapKeyframe& b, double metres, double rad) {
-  return (a.T_MB.p - b.T_MB.p).squaredNorm() < metres * metres && angle_between(a.T_MB.q, b.T_MB.q) < rad;
-}
-
 using Pairs = std::map<KeyframeId, std::set<KeyframeId>>;  // a flown keyframe, and the older ones to compare with
 
 class Upkeep {
@@ -53,6 +49,13 @@ class Upkeep {
   }
 
  private:
+  /// Between the cameras that saw their places.
+  double angle_between_views(const MapKeyframe& a, const MapKeyframe& b) const {
+    return angle_between(map_.T_MC(a).q, map_.T_MC(b).q);
+  }
+  bool within(const MapKeyframe& a, const MapKeyframe& b, double metres, double rad) const {
+    return (a.T_MB.p - b.T_MB.p).squaredNorm() < metres * metres && angle_between_views(a, b) < rad;
+  }
   bool is_flown(const MapKeyframe& k) const { return flown_.count(k.session) > 0; }
   void leave(const MapKeyframe& k) {
     if (k.id != map_.keyframes().front().id) gone_.insert(k.id);
@@ -65,7 +68,7 @@ class Upkeep {
       std::vector<std::pair<double, KeyframeId>> near;
       for (const MapKeyframe* k : new_)
         if (within(*old, *k, kSees_m, kSees_rad))
-          near.emplace_back((old->T_MB.p - k->T_MB.p).norm() + angle_between(old->T_MB.q, k->T_MB.q), k->id);
+          near.emplace_back((old->T_MB.p - k->T_MB.p).norm() + angle_between_views(*old, *k), k->id);
       if (near.empty()) continue;
       looked_at_.insert(old->id);
       std::sort(near.begin(), near.end());
@@ -85,8 +88,7 @@ class Upkeep {
       verifier_.set_query(*place);
       for (const KeyframeId other : with) {
         const MapKeyframe& old = *map_.find(other);
-        const auto found =
-            verifier_.verify(*map_.place_of(old), {(k.T_MB * map_.T_BC0).inverse() * (old.T_MB * map_.T_BC0), kSearch_px});
+        const auto found = verifier_.verify(*map_.place_of(old), {map_.T_MC(k).inverse() * map_.T_MC(old), kSearch_px});
         if (!found) continue;
         seen_.insert(other);
         if (within(old, k, kSame_m, kSame_rad) && static_cast<double>(found->pose.inliers.size()) > kSameShare * found->visible)

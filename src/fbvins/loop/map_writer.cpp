@@ -154,7 +154,7 @@ Result<void> write_map(const PlaceMap& map, const std::function<void(std::string
   front.put(static_cast<std::uint32_t>(std::ranges::count_if(map.keyframes(), &MapKeyframe::placed)));
   front.put(static_cast<std::uint32_t>(rest.edges.size()));
   front.put(map.vocabulary);
-  front.put(map.T_BC0);
+  front.put(map.cameras[0]);
   front.raw(keyframes->data(), keyframes->size());
   put_rest(front, rest);
   if ((flags & kMapMemory) != 0) put_missed(front, map);

@@ -19,8 +19,6 @@ class OdometryDrift {
  public:
   explicit OdometryDrift(const DriftOptions& assumed) : assumed_(assumed), rate_(assumed) {}
 
-  /// A flight begins.
-  void restart() { rate_ = assumed_, known_ = false, first_.reset(); }
   /// `covariance`: of gauge.T_GB, as (dp in G, dtheta in B); zero: unknown. What it was at first does not count, because G may
   /// be older than the flight: a correction can begin a new W in the same G. `path_m`: flown.
   void take(const Mat6& covariance, const GaugeState& gauge, double path_m);

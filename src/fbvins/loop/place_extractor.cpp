@@ -42,7 +42,7 @@ std::optional<Pose<C1, C0>> between_exposures(const StereoRig& rig, const Keyfra
 }  // namespace
 
 PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
-                               std::unique_ptr<DescriptorStage> stage)
+                               std::shared_ptr<DescriptorStage> stage)
     : rig_(rig),
       vocabulary_(std::move(vocabulary)),
       stage_(std::move(stage)),
@@ -53,16 +53,25 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
 }
 
 Place PlaceExtractor::extract(const Keyframe& keyframe) {
-  const std::optional<Pose<B, B>> left = at_exposure(keyframe, 0);
-  const Pose<G, C0> T_GC = keyframe.gauge.T_GB * left.value_or(Pose<B, B>{}) * rig_.T_BC0;
+  const std::optional<Pose<G, C0>> T_GC = left_camera(keyframe);
   const StereoFrame& images = keyframe.images;
-  const bool left_alone = images.left && left && !images.right && !has_depth_image(images);
+  const bool left_alone = images.left && T_GC && !images.right && !has_depth_image(images);
   bool second = false;
-  if (left_alone) second = look_back(keyframe, T_GC);
+  if (left_alone) second = look_back(keyframe, *T_GC);
   else if (const auto T_C1C0 = between_exposures(rig_, keyframe)) second = look_right(images, *T_C1C0);
   Place place = extract(images, level_attitude(keyframe), second);
-  if (left) earlier_.add(keyframe, T_GC);
+  if (T_GC) earlier_.add(keyframe, *T_GC);
   return place;
+}
+
+void PlaceExtractor::remember(const Keyframe& keyframe) {
+  if (const std::optional<Pose<G, C0>> T_GC = left_camera(keyframe)) earlier_.add(keyframe, *T_GC);
+}
+
+/// When it took its image. None without readings.
+std::optional<Pose<G, C0>> PlaceExtractor::left_camera(const Keyframe& keyframe) const {
+  const std::optional<Pose<B, B>> moved = at_exposure(keyframe, 0);
+  return moved ? std::optional(keyframe.gauge.T_GB * *moved * rig_.T_BC0) : std::nullopt;
 }
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {

@@ -13,10 +13,15 @@ namespace fbvins {
 namespace {
 
 constexpr std::size_t kMostAnchors = 5000;
-/// Differences of two rigs' bodies (m and rad together) below this are rounding errors.
-constexpr double kSameBody = 1e-9;
+/// Differences of poses (m and rad together) below this are rounding errors.
+constexpr double kSamePose = 1e-9;
 /// Beyond this a scale is no error of an odometry.
 constexpr double kLargestLogScale = 0.5;
+
+template <class A, class B>
+bool is_rounding(const Pose<A, B>& T) {
+  return T.p.norm() + 2 * T.q.vec().norm() < kSamePose;
+}
 
 template <class Keyframes>
 auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {
@@ -158,7 +163,14 @@ void PlaceMap::add_anchor(MapAnchor anchor) {
 
 void PlaceMap::level(std::uint32_t session, const Quat& q_LG) {
   for (auto k = keyframes_.rbegin(); k != keyframes_.rend() && k->session >= session; ++k)
-    if (k->session == session) k->place.up_C0 = (q_LG * k->T_GB.q * T_BC0.q).conjugate() * Vec3::UnitZ();
+    if (k->session == session) k->place.up_C0 = (q_LG * k->T_GB.q * T_BC(*k).q).conjugate() * Vec3::UnitZ();
+}
+
+std::uint16_t PlaceMap::camera_at(const Pose<B, C0>& T_BC) {
+  const auto at = std::ranges::find_if(cameras, [&](const auto& T) { return is_rounding(T.inverse() * T_BC); });
+  const auto number = static_cast<std::uint16_t>(at - cameras.begin());
+  if (at == cameras.end()) cameras.push_back(T_BC);
+  return number;
 }
 
 /// Keyframes connected to the first one or to an anchored one; the others have no place in M yet and stay as they are.
@@ -208,7 +220,7 @@ double PlaceMap::log_scale_of(std::uint32_t number) const {
 
 std::vector<double> PlaceMap::chi2_of_edges(const PoseGraphOptions& options) const {
   PoseGraph graph;
-  for (const MapKeyframe& k : keyframes_) graph.add_node(k.T_MB, T_BC0.q * k.place.up_C0);
+  for (const MapKeyframe& k : keyframes_) graph.add_node(k.T_MB, up_B(k));
   const Scales scales = add_scales(graph, 0);
   std::vector<double> all;
   all.reserve(edges.size());
@@ -229,7 +241,7 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options, std::uint32_
   const auto may_move = [&](KeyframeId id) { return moves[static_cast<std::size_t>(index_of(id))]; };
   for (std::size_t i = 0; i < keyframes_.size(); ++i) moves[i] = moves[i] && keyframes_[i].session >= first;
   for (std::size_t i = 0; i < keyframes_.size(); ++i)
-    graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, !moves[i] || (i == 0 && !anchored));
+    graph.add_node(keyframes_[i].T_MB, up_B(keyframes_[i]), !moves[i] || (i == 0 && !anchored));
   // Nothing but other flights, or anchors, says anything of a flight's scale.
   const Scales scales = sessions.size() > 1 || anchored ? add_scales(graph, first) : Scales{};
   for (const MapEdge& e : edges)
@@ -250,10 +262,11 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options, std::uint32_
 }
 
 void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0) {
-  const Pose<B, B> T_old_new = map.T_BC0 * T_BC0.inverse();
-  map.T_BC0 = T_BC0;
-  if (T_old_new.p.norm() + 2 * T_old_new.q.vec().norm() < kSameBody) return;
+  const Pose<B, B> T_old_new = map.cameras[0] * T_BC0.inverse();
+  map.cameras[0] = T_BC0;
+  if (is_rounding(T_old_new)) return;
   const Pose<B, B> T_new_old = T_old_new.inverse();
+  for (std::size_t i = 1; i < map.cameras.size(); ++i) map.cameras[i] = T_new_old * map.cameras[i];
   for (MapKeyframe& k : map.keyframes()) k.T_MB = k.T_MB * T_old_new, k.T_GB = k.T_GB * T_old_new;
   for (MapEdge& e : map.edges) {
     Mat6 cov = compose_covariance(T_new_old, Mat6::Zero(), e.T_from_to, e.information.inverse());

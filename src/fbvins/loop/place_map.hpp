@@ -44,6 +44,7 @@ struct MapKeyframe {
   int loops_ending_here = 0;  ///< loops that ended here
   int missed = 0;             ///< later sessions in a row that stood here and did not know it again
   bool placed = true;         ///< T_MB is known: its session has been localised in the map
+  std::uint16_t camera = 0;   ///< of PlaceMap::cameras: the one that saw its place
   std::int32_t stored = -1;   ///< slot of its place in PlaceMap::store; -1: the place is here
   Place place;                ///< where it is stored: vertical and focal length only
   MapMotion motion;
@@ -133,6 +134,13 @@ class PlaceMap {
   /// Of each edge at the present poses: squared residual in standard deviations, six of them.
   std::vector<double> chi2_of_edges(const PoseGraphOptions& options) const;
 
+  /// T_BC of the camera that saw a keyframe's place.
+  const Pose<B, C0>& T_BC(const MapKeyframe& k) const { return cameras[k.camera]; }
+  Pose<M, C0> T_MC(const MapKeyframe& k) const { return k.T_MB * T_BC(k); }
+  Vec3 up_B(const MapKeyframe& k) const { return T_BC(k).q * k.place.up_C0; }
+  /// Number of the camera with this pose; a new one where there is none.
+  std::uint16_t camera_at(const Pose<B, C0>& T_BC);
+
   /// What is remembered of a session; made where nothing is.
   MapSession& session(std::uint32_t number, Time t);
   /// Logarithm of the length in M of a session's metre; 0 where nothing is known of it.
@@ -141,9 +149,10 @@ class PlaceMap {
   std::vector<MapEdge> edges;
   std::vector<MapAnchor> anchors;
   std::vector<MapTag> tags;
-  std::vector<MapSession> sessions;     ///< in order of number
-  bool anchored = false;                ///< M is the frame A of the anchors
-  Pose<B, C0> T_BC0;                    ///< of the camera that saw the places
+  std::vector<MapSession> sessions;  ///< in order of number
+  bool anchored = false;             ///< M is the frame A of the anchors
+  std::vector<Pose<B, C0>> cameras =
+      std::vector<Pose<B, C0>>(1);      ///< T_BC of those that saw places; the first, always there, says where the body is
   double gravity_mps2 = 9.81;           ///< of the readings on its edges
   bool boosted = false;                 ///< descriptors are boosted ones, which compare with such only
   std::string name;                     ///< for people; empty: none
@@ -162,7 +171,7 @@ class PlaceMap {
   std::int64_t next_id_ = 0;
 };
 
-/// Makes the body that of another rig whose camera is the same: the camera's poses stay.
+/// Makes the body that of another rig, whose first camera is the map's: the cameras' poses stay.
 void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0);
 
 /// With the lengths of flights of one camera in metres of M: of their steps, loops and places, which must be in memory.

@@ -47,6 +47,22 @@ TEST(PlaceMap, ReadingsOfARemovedKeyframesTwoStepsBecomeOne) {
   EXPECT_FALSE(map.edges.back().imu) << "six seconds constrain too little";
 }
 
+TEST(PlaceMap, AnotherBodyLeavesEachCameraWhereItWas) {
+  PlaceMap map = chain(3);
+  map.cameras[0] = {so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.01, 0.02, 0.03)};
+  const Pose<B, C0> second(so3_exp(Vec3(0, 2, 0)), Vec3(0.3, 0, 0));
+  map.keyframes()[1].camera = map.camera_at(second);
+  EXPECT_EQ(map.camera_at(second), 1) << "it is there already";
+  const PlaceMap before = map;
+  const Pose<B, C0> first(so3_exp(Vec3(1, 0, 0)), Vec3(0.5, -0.2, 0));
+  change_body(map, first);
+  EXPECT_EQ(map.cameras[0].p, first.p);
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const Pose<C0, C0> moved = before.T_MC(before.keyframes()[i]).inverse() * map.T_MC(map.keyframes()[i]);
+    EXPECT_LT(moved.p.norm() + moved.q.vec().norm(), 1e-12) << i;
+  }
+}
+
 TEST(PlaceMap, TurnsAsAWhole) {
   PlaceMap map = chain(3);
   map.keyframes()[2].placed = false;

@@ -26,7 +26,6 @@ struct LevelledGauge {
 
 class PlaceVertical {
  public:
-  void forget() { *this = {}; }
   /// What the odometry's attitude drifts until the next keyframe.
   void advance(double drift_rad2) { variance_rad2_ += drift_rad2; }
   /// A place that contradicts gravity is not used.

@@ -17,7 +17,6 @@ namespace fbvins {
 
 class RecentMotion {
  public:
-  void forget() { *this = {}; }
   void add(const Keyframe& keyframe);
   /// Nothing before the keyframes of the last seconds, after the newest, and where readings are missing.
   std::optional<Pose<G, B>> at(Time t) const;

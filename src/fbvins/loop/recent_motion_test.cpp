@@ -44,8 +44,6 @@ TEST(RecentMotion, IsNotKnownBeforeAfterAndWithoutReadings) {
   EXPECT_TRUE(motion.at(at_s(2.5)));
   EXPECT_TRUE(motion.at(at_s(2.7)));
   EXPECT_FALSE(motion.at(at_s(3.01)));
-  motion.forget();
-  EXPECT_FALSE(motion.at(at_s(2.7)));
 }
 
 TEST(RecentMotion, ForgetsWhatIsOld) {

@@ -63,6 +63,14 @@ inline StereoRig rig() {
   return r;
 }
 
+/// A pair that looks ahead and one that looks back, whose cameras are 2 and 3.
+inline StereoRig rig_that_looks_back() {
+  StereoRig r = rig();
+  const Pose<B, B> turned(Quat(Eigen::AngleAxisd(3.141592653589793, Vec3::UnitZ())), Vec3(0.02, 0, 0.01));
+  r.more = {{r.left, turned * r.T_BC0}, {r.right, turned * r.T_BC1.cast_frames<B, C0>()}};
+  return r;
+}
+
 /// Without words.
 inline Place view(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
   const Pose<G, C0> T_GC = T_GB * rig().T_BC0;

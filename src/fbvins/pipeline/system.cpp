@@ -153,7 +153,10 @@ struct System::Impl {
     const Pose<W, G> T_WG = estimate.odometry.T_WB * estimate.odometry.gauge.T_GB.inverse();
     for (Keyframe& keyframe : estimate.keyframes) {
       keyframe.T_WG = T_WG;
-      for (KeyframeLandmark& landmark : keyframe.landmarks) landmark.pixel += lenses.origin_px(0);
+      for (KeyframeLandmark& landmark : keyframe.landmarks) {
+        landmark.pixel += lenses.origin_px(landmark.camera);
+        landmark.camera = lenses.lens_of(landmark.camera);
+      }
       keyframe.imu = {readings.until(keyframe.t), keyframe.imu.bias, imu_model.noise, imu_model.gravity_mps2};
       keyframe.anchors = anchors.until(keyframe.t);
     }
