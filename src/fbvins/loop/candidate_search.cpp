@@ -18,8 +18,8 @@ constexpr std::size_t kManyEntries = 100'000, kFewestWords = 40;
 constexpr int kShortlist = 120;
 /// To compare with the words of a keyframe is as much work as so many entries of the index.
 constexpr std::size_t kEntriesOfAKeyframe = 1000;
-/// Keyframes younger than this make no loop, nor do those that the flight has left for a place farther away than this share of
-/// the way since: the odometry connects them.
+/// Keyframes younger than this make no loop, nor do those that the flight only left: they are farther away than this share of the
+/// way since, on which the odometry knows better (L37).
 constexpr double kMinAge_s = 2, kCameBack = 0.5;
 /// Keyframes that look in a direction that differs more are no candidates.
 constexpr double kMaxAngle_rad = 65 * kDegree;
