@@ -31,11 +31,14 @@ examples:
   fbvins simulate dim --options > dim.yaml          every option of a preset with unit, range and meaning
 )";
 
+/// Edge of a tag's black square.
+constexpr double kTagSize_m = 0.2;
+
 struct Arguments {
   std::string preset = "normal", config, out, trajectory, imu;
   std::vector<std::string> assignments;
   int seed = -1, max_images = 0, tags = 0;
-  double seconds = 0, tag_size_m = 0.2;
+  double seconds = 0;
   bool options = false, depth = false, landmarks = false, quiet = false;
 };
 
@@ -70,7 +73,7 @@ int simulate_flight(const Arguments& arguments) {
   if (arguments.out.empty()) return fail("--out FOLDER is needed");
   Result<TagSurvey> tags = TagSurvey{};
   Result<Simulation> simulation = prepare_simulation(*options, [&](World& world, const Simulation& s) {
-    if (arguments.tags > 0) tags = hang_tags(world, s, arguments.tags, arguments.tag_size_m);
+    if (arguments.tags > 0) tags = hang_tags(world, s, arguments.tags, kTagSize_m);
   });
   if (!simulation) return fail(simulation.error().message);
   if (!tags) return fail(tags.error().message);
@@ -108,10 +111,9 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU readings, used unchanged (EuRoC CSV)");
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--tags", arguments->tags, "hang so many AprilTags on walls, their poses in tags.yaml (docs/maps.md)")
+  command
+      ->add_option("--tags", arguments->tags, "hang so many AprilTags of 0.2 m on walls, their poses in tags.yaml (docs/maps.md)")
       ->check(CLI::Range(0, 100));
-  command->add_option("--tag-size", arguments->tag_size_m, "edge of a tag's black square, m (default 0.2)")
-      ->check(CLI::Range(0.02, 2.0));
   command->add_flag("--depth", arguments->depth, "write left depth images in millimetres, too");
   command->add_flag("--landmarks", arguments->landmarks, "write the corners of the world's surfaces, too");
   command->add_flag("--options", arguments->options, "print the effective options and stop");
