@@ -185,7 +185,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   ImuSegment imu = frame.imu;
   imu.noise = reading_noise_.of(imu);
   Frame predicted = predict(frame, imu);
-  const std::vector<TrackedFeature> features = examine(frame, imu, predicted);
+  const std::vector<TrackedFeature> features = check_readings(frame, imu, predicted);
   out.imu_noise = imu.noise;
   predicted.standstill = standstill;
   if (surfaces_.has_sensor() && std::ssize(landmark_observations(window_, features, calibration_)) < kEnoughLandmarks)
@@ -207,7 +207,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
 
 /// Compares images and readings, and returns the features of the cameras that agree. Readings that the images
 /// contradict count less.
-std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
+std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
   wrong_cameras_ = 0;
   const Duration dt = frame.t - window_.newest().t;
   // After a gap the images have to say first how fast the vehicle is.
@@ -216,8 +216,8 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     monitor_.pass(dt);
     return frame.features;
   }
-  const Monitor::Verdict verdict = monitor_.examine(landmark_observations(window_, frame.features, calibration_), calibration_,
-                                                    predicted.state.T_FB, dt, predicted.state.v_B());
+  const Monitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
+                                                  predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
     imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);

@@ -63,7 +63,7 @@ class Estimator {
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
   TrackedFrame refer_to_stamp(const TrackedFrame& frame) const;
   Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
-  std::vector<TrackedFeature> examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
+  std::vector<TrackedFeature> check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
   void fill_covariances(const WindowSolution& solution, Odometry& out);
   void shrink_window(const WindowSolution& solution, Estimate& out);
