@@ -290,6 +290,26 @@ int measure_noise(const Arguments& a) {
   return kOk;
 }
 
+/// What is estimated, and from how much.
+void add_solver_options(CLI::App& command, Arguments& a) {
+  command
+      .add_option("--model", a.models,
+                  "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  command.add_flag("--cameras-only", a.cameras_only, "leave the IMU out");
+  command.add_flag("--imu-axes", a.imu_options.imu_axes, "estimate scale and axes of the IMU, too");
+  command.add_flag("--camera-offsets", a.imu_options.camera_offsets, "estimate a time offset of each camera, too");
+  command.add_flag("--line-delay", a.imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
+  command.add_option("--gravity", a.imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
+      ->capture_default_str();
+  command.add_option("--max-views", a.max_views, "stamps that enter the adjustment of the cameras")
+      ->check(CLI::Range(10, 100000))
+      ->capture_default_str();
+  command.add_option("--threads", a.threads, "threads that look for the board")->check(CLI::Range(1, 64))->capture_default_str();
+}
+
 }  // namespace
 
 void add_calibrate_command(CLI::App& program, int& exit_code) {
@@ -318,18 +338,7 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");
   command->add_option("--imu-calibration", a->imu_calibration, "the IMU's noise: Kalibr's imu.yaml");
-  command
-      ->add_option("--model", a->models,
-                   "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  command->add_flag("--cameras-only", a->cameras_only, "leave the IMU out");
-  command->add_flag("--imu-axes", a->imu_options.imu_axes, "estimate scale and axes of the IMU, too");
-  command->add_flag("--camera-offsets", a->imu_options.camera_offsets, "estimate a time offset of each camera, too");
-  command->add_flag("--line-delay", a->imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
-  command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
-      ->capture_default_str();
+  add_solver_options(*command, *a);
   command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest, or in imu0/data.csv");
   CLI::Option* from_flight = command->add_option(
       "--from-flight", a->from_flight, "recordings that `fbvins run` reads, whose calibration they refine, without a board");
@@ -338,12 +347,6 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command
       ->add_option("--calibration", a->calibration, "with --from-flight: the calibration given, instead of the recordings' own")
       ->needs(from_flight);
-  command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")
-      ->check(CLI::Range(10, 100000))
-      ->capture_default_str();
-  command->add_option("--threads", a->threads, "threads that look for the board")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
   command->add_flag("--save-detections", a->save_detections, "write detections.csv");
   command->add_option("--out", a->out, "folder for the results")->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors");

@@ -16,6 +16,10 @@
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/record_switch.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace fbvins::app {
 
 struct OutputArguments {
@@ -24,6 +28,8 @@ struct OutputArguments {
   bool record_images = true, quiet = false;
   bool record_on_request = false;  ///< the record does not begin by itself
   double record_keep_free_mb = 256;
+
+  void add_to(CLI::App& command);
 };
 
 /// What went wrong with outputs, said at once on stderr. One thread.

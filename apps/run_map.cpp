@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 
@@ -109,6 +110,15 @@ std::vector<MapSummary::Found> found_again(const MapRecord& record, const RunRec
 }
 
 }  // namespace
+
+void MapArguments::add_to(CLI::App& command) {
+  command.add_flag("--loop", loop, "loop closure: a map beside the odometry");
+  command.add_option("--save-map", save, "file for the map at the end; with loop closure");
+  command.add_option("--load-map", load, "map to relocalise in and extend; with loop closure");
+  command.add_option("--tags", tags,
+                     "YAML of AprilTags, at known places in the building or anywhere; with loop closure (docs/maps.md)");
+  command.add_option("--vocabulary", vocabulary, "vocabulary file for loop closure, instead of the one that ships");
+}
 
 Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const StereoRig& rig, const LoopOptions& options) {
   if (!arguments.wanted()) return std::unique_ptr<LoopMap>();
