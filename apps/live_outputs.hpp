@@ -3,8 +3,6 @@
 // goes on without it. Only a wrong command line ends the program.
 #pragma once
 
-#include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
