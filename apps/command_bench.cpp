@@ -10,8 +10,8 @@
 #include "apps/command_line.hpp"
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/experiment/bench_runner.hpp"
 #include "fbvins/experiment/bench_tables.hpp"
 #include "fbvins/report/report.hpp"
@@ -44,11 +44,12 @@ struct Arguments {
 
 Result<void> write_all(const Arguments& a, const std::string& title, const std::vector<CellResult>& results,
                        const nlohmann::ordered_json& payload) {
-  if (Result<void> done = write_text(a.out + "/results.csv", results_csv(results)); !done) return done;
-  if (Result<void> done = write_text(a.out + "/results.json", results_json(title, results).dump(1) + "\n"); !done) return done;
+  if (Result<void> done = write_file_atomically(a.out + "/results.csv", results_csv(results)); !done) return done;
+  if (Result<void> done = write_file_atomically(a.out + "/results.json", results_json(title, results).dump(1) + "\n"); !done)
+    return done;
   const std::string provenance = fmt::format("fbvins {} on {}\n\n", FBVINS_VERSION, describe_machine());
-  if (Result<void> done = write_text(a.out + "/tables.md", provenance + markdown(payload)); !done) return done;
-  return write_text(a.out + "/report.html", report_html({}, payload, {.title = title}));
+  if (Result<void> done = write_file_atomically(a.out + "/tables.md", provenance + markdown(payload)); !done) return done;
+  return write_file_atomically(a.out + "/report.html", report_html({}, payload, {.title = title}));
 }
 
 int list_cells(const Plan& plan) {

@@ -13,7 +13,6 @@
 #include "apps/guided_calibration.hpp"
 #include "apps/open_cameras.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_output.hpp"
 #include "apps/solve_calibration.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
@@ -21,6 +20,7 @@
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/imu_noise.hpp"
 #include "fbvins/calibration/target_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/imu_file.hpp"
@@ -257,7 +257,7 @@ int calibrate(const Arguments& a) {
     return kInterrupted;
   }
   if (a.save_detections)
-    if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
+    if (Result<void> done = write_file_atomically(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
       return fail(done.error().message);
   return conclude(a, *board, *material);
 }
@@ -282,7 +282,7 @@ int measure_noise(const Arguments& a) {
   std::filesystem::create_directories(a.out, error);
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   const std::string text = imu_noise_to_kalibr(*found, "/imu0");
-  if (Result<void> done = write_text(a.out + "/imu.yaml", text); !done) return fail(done.error().message);
+  if (Result<void> done = write_file_atomically(a.out + "/imu.yaml", text); !done) return fail(done.error().message);
   if (a.quiet) return kOk;
   fmt::print("{:.1f} s at rest\n{}", found->duration_s, text);
   for (const std::string& warning : found->warnings) fmt::print("note: {}\n", warning);

@@ -20,6 +20,7 @@
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
 #include "apps/web_page.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/reset_counter_sink.hpp"
@@ -107,14 +108,14 @@ Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault
 }
 
 Result<void> write_results(const std::string& folder, const Config& config, const Source& source, const LiveSummary& summary) {
-  if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
+  if (Result<void> done = write_file_atomically(folder + "/config.yaml", to_yaml(config)); !done) return done;
   if (const auto* replay = dynamic_cast<const ReplaySource*>(&source); replay && replay->dataset().has_ground_truth()) {
     std::vector<Time> images;
     for (const FrameEntry& frame : replay->dataset().frames()) images.push_back(frame.t);
     if (Result<void> done = write_truth(images, replay->dataset().ground_truth(), folder); !done) return done;
   }
-  if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
-  return write_text(folder + "/summary.txt", to_text(summary));
+  if (Result<void> done = write_file_atomically(folder + "/summary.json", to_json_text(summary)); !done) return done;
+  return write_file_atomically(folder + "/summary.txt", to_text(summary));
 }
 
 Result<std::unique_ptr<Source>> source_of(const Arguments& arguments, const RosGraph& graph) {

@@ -2,16 +2,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/boards/hung_tags.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 
@@ -60,7 +59,7 @@ Result<SimulationOptions> options_of(const Arguments& arguments) {
 }
 
 Result<void> write_options(SimulationOptions options, const std::string& folder) {
-  return write_text(folder + "/simulation.yaml", write_yaml(fields_of(options)));
+  return write_file_atomically(folder + "/simulation.yaml", write_yaml(fields_of(options)));
 }
 
 int simulate_flight(const Arguments& arguments) {
@@ -83,7 +82,7 @@ int simulate_flight(const Arguments& arguments) {
   const Result<void> written = write_euroc(*simulation, arguments.out, writer, [&](int done, int) { progress.update(done); });
   if (!written) return fail(written.error().message);
   if (arguments.tags > 0)
-    if (Result<void> saved = write_text(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
+    if (Result<void> saved = write_file_atomically(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
       return fail(saved.error().message);
   if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
   if (!arguments.quiet)

@@ -9,6 +9,7 @@
 
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/tag_finder.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/io/anchor_file.hpp"
 #include "fbvins/io/trajectory.hpp"
@@ -171,7 +172,7 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
   if (Result<void> done = write_tum(record.bounded, folder + "/map_bounded_tum.txt"); !done) return done;
   std::string text = kUpdatesHeader;
   for (const MapUpdate& u : record.updates) text += row_of(u);
-  return write_text(folder + "/map_updates.csv", text);
+  return write_file_atomically(folder + "/map_updates.csv", text);
 }
 
 MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory<W>& truth) {
