@@ -16,17 +16,17 @@ CameraPair pair_of(int camera, const std::vector<LandmarkObservation>& observati
 
 }  // namespace
 
-double CameraResiduals::worst() const {
+double ResidualMedians::worst() const {
   double worst = 0;
   for (const std::optional<double>& n : norm) worst = std::max(worst, n.value_or(0));
   return worst;
 }
 
-CameraResiduals camera_residuals(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
+ResidualMedians camera_residuals(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
                                  const Pose<G, B>& T_GB, const Vec3& v_B) {
   const CameraGeometry cameras(calibration);
   const Mat3 R_BG = T_GB.R().transpose();
-  CameraResiduals out;
+  ResidualMedians out;
   out.shift.fill(Vec2::Zero());
   for (int c = 0; c < calibration.camera_count(); ++c) {
     std::vector<double> residuals, x, y;
@@ -48,7 +48,7 @@ CameraResiduals camera_residuals(const std::vector<LandmarkObservation>& observa
   return out;
 }
 
-std::optional<CameraPair> camera_off_alone(const std::vector<LandmarkObservation>& observations, const CameraResiduals& at,
+std::optional<CameraPair> camera_off_alone(const std::vector<LandmarkObservation>& observations, const ResidualMedians& at,
                                            const std::vector<double>& off, const std::function<double(double)>& limit) {
   const auto worst = static_cast<int>(std::max_element(off.begin(), off.end()) - off.begin());
   if (!at.of(worst)) return std::nullopt;

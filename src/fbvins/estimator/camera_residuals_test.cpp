@@ -39,8 +39,8 @@ struct Scene {
       observations.push_back({p_G, &features[i]});
     }
   }
-  CameraResiduals residuals() const { return camera_residuals(observations, calibration, {}, Vec3::Zero()); }
-  std::optional<CameraPair> alone(const CameraResiduals& at, double limit) const {
+  ResidualMedians residuals() const { return camera_residuals(observations, calibration, {}, Vec3::Zero()); }
+  std::optional<CameraPair> alone(const ResidualMedians& at, double limit) const {
     std::vector<double> off;
     for (std::size_t c = 0; c < 4; ++c) off.push_back(at.norm[c].value_or(0));
     return camera_off_alone(observations, at, off, [limit](double) { return limit; });
@@ -48,7 +48,7 @@ struct Scene {
 };
 
 TEST(CameraResiduals, AreTheMediansOfEachCameraInStandardDeviations) {
-  const CameraResiduals at = Scene({0, 2, -3, 0}).residuals();
+  const ResidualMedians at = Scene({0, 2, -3, 0}).residuals();
   EXPECT_NEAR(*at.norm[1], 2, 1e-9);
   EXPECT_NEAR(*at.norm[2], 3, 1e-9);
   EXPECT_NEAR(at.shift[2].x(), 3, 1e-9) << "the prediction minus what is seen";
@@ -57,7 +57,7 @@ TEST(CameraResiduals, AreTheMediansOfEachCameraInStandardDeviations) {
 }
 
 TEST(CameraResiduals, FewLandmarksSayNothing) {
-  const CameraResiduals at = Scene({2, 2, 2, 2}, 28).residuals();
+  const ResidualMedians at = Scene({2, 2, 2, 2}, 28).residuals();
   EXPECT_FALSE(at.of(0) || at.of(3));
   EXPECT_EQ(at.worst(), 0);
 }

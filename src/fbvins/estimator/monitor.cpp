@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "fbvins/core/median.hpp"
+#include "fbvins/estimator/camera_residuals.hpp"
 
 namespace fbvins {
 namespace {
@@ -140,7 +141,7 @@ Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observat
   out.noise.gyro = turning_noise_;
   ahead_G_ = middle_of(observations) - predicted.p;
   const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
-  const CameraResiduals at_prediction = camera_residuals(observations, calibration, predicted, v_B);
+  const ResidualMedians at_prediction = camera_residuals(observations, calibration, predicted, v_B);
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
@@ -149,7 +150,7 @@ Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observat
     return out;
   }
   const PoseRefinement seen = refine_pose(observations, calibration, predicted, v_B);
-  const CameraResiduals at_seen = camera_residuals(observations, calibration, seen.T_GB, v_B);
+  const ResidualMedians at_seen = camera_residuals(observations, calibration, seen.T_GB, v_B);
   std::vector<double> off;
   for (std::size_t c = 0; c < static_cast<std::size_t>(calibration.camera_count()); ++c)
     off.push_back(excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0));

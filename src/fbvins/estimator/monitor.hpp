@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "fbvins/estimator/accumulated_doubt.hpp"
-#include "fbvins/estimator/camera_residuals.hpp"
+#include "fbvins/estimator/pose_refinement.hpp"
 #include "fbvins/estimator/tilt_check.hpp"
 #include "fbvins/estimator/window_turns.hpp"
 #include "fbvins/types/imu.hpp"
