@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "apps/commands.hpp"
 #include "apps/flight_calibration_report.hpp"
 #include "apps/open_recording.hpp"

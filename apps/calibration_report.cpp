@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/calibration_page.hpp"
-#include "apps/run_output.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/core/atomic_file.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -202,7 +202,7 @@ Result<void> write_calibration(const CalibrationOutcome& outcome, const std::str
                              {"calibration.txt", calibration_text(outcome)},
                              {"calibration.html", calibration_html(outcome)}});
   for (const auto& [name, text] : files)
-    if (Result<void> done = write_text(folder + "/" + name, text); !done) return done;
+    if (Result<void> done = write_file_atomically(folder + "/" + name, text); !done) return done;
   return {};
 }
 

@@ -3,16 +3,15 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <thread>
 
 #include "apps/command_line.hpp"
 #include "apps/commands.hpp"
-#include "apps/run_output.hpp"
+#include "apps/progress.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/experiment/bench_runner.hpp"
 #include "fbvins/experiment/bench_tables.hpp"
 #include "fbvins/report/report.hpp"
@@ -43,49 +42,14 @@ struct Arguments {
   bool list = false, quiet = false;
 };
 
-std::string clock_text(double seconds) {
-  const int s = static_cast<int>(seconds + 0.5);
-  return s < 60     ? fmt::format("{} s", s)
-         : s < 3600 ? fmt::format("{}:{:02} min", s / 60, s % 60)
-                    : fmt::format("{}:{:02} h", s / 3600, s / 60 % 60);
-}
-
-/// A bar with the time left on a terminal, a line for each cell elsewhere.
-class BenchProgress {
- public:
-  explicit BenchProgress(bool quiet) : quiet_(quiet), terminal_(stderr_is_terminal()), start_(std::chrono::steady_clock::now()) {}
-  ~BenchProgress() {
-    if (!quiet_ && terminal_) fmt::print(stderr, "\r\033[K");
-  }
-  BenchProgress(const BenchProgress&) = delete;
-  BenchProgress& operator=(const BenchProgress&) = delete;
-
-  void update(const BenchStep& step) const {
-    if (quiet_) return;
-    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    const std::string left =
-        step.share > 0.01 && step.share < 1 ? clock_text(elapsed / step.share * (1 - step.share)) + " left" : "";
-    const std::string text =
-        fmt::format("{:3.0f} %  {}/{} cells  {}  {}", 100 * step.share, step.cells_done, step.cells, left, step.now);
-    constexpr int kWidth = 24;
-    const int filled = static_cast<int>(kWidth * step.share);
-    if (terminal_) fmt::print(stderr, "\r\033[K[{:#>{}}{:.>{}}] {}", "", filled, "", kWidth - filled, text);
-    else fmt::print(stderr, "{}\n", text);
-    std::fflush(stderr);
-  }
-
- private:
-  bool quiet_, terminal_;
-  std::chrono::steady_clock::time_point start_;
-};
-
 Result<void> write_all(const Arguments& a, const std::string& title, const std::vector<CellResult>& results,
                        const nlohmann::ordered_json& payload) {
-  if (Result<void> done = write_text(a.out + "/results.csv", results_csv(results)); !done) return done;
-  if (Result<void> done = write_text(a.out + "/results.json", results_json(title, results).dump(1) + "\n"); !done) return done;
+  if (Result<void> done = write_file_atomically(a.out + "/results.csv", results_csv(results)); !done) return done;
+  if (Result<void> done = write_file_atomically(a.out + "/results.json", results_json(title, results).dump(1) + "\n"); !done)
+    return done;
   const std::string provenance = fmt::format("fbvins {} on {}\n\n", FBVINS_VERSION, describe_machine());
-  if (Result<void> done = write_text(a.out + "/tables.md", provenance + markdown(payload)); !done) return done;
-  return write_text(a.out + "/report.html", report_html({}, payload, {.title = title}));
+  if (Result<void> done = write_file_atomically(a.out + "/tables.md", provenance + markdown(payload)); !done) return done;
+  return write_file_atomically(a.out + "/report.html", report_html({}, payload, {.title = title}));
 }
 
 int list_cells(const Plan& plan) {
@@ -122,8 +86,11 @@ int bench(Arguments a) {
   }
 
   const Result<BenchOutcome> outcome = [&] {
-    const BenchProgress progress(a.quiet);
-    return run_plan(*plan, a.bench, [&](const BenchStep& step) { progress.update(step); });
+    const ProgressBar bar(a.quiet);
+    return run_plan(*plan, a.bench, [&](const BenchStep& step) {
+      bar.draw(step.share, fmt::format("{:3.0f} %  {}/{} cells  {}  {}", 100 * step.share, step.cells_done, step.cells,
+                                       step.share > 0.01 ? bar.left(step.share, 1 - step.share) : "", step.now));
+    });
   }();
   if (!outcome) return fail(outcome.error().message);
   for (const std::string& problem : outcome->failed) warn(problem);

@@ -13,7 +13,6 @@
 #include "apps/guided_calibration.hpp"
 #include "apps/open_cameras.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_output.hpp"
 #include "apps/solve_calibration.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
@@ -21,6 +20,7 @@
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/imu_noise.hpp"
 #include "fbvins/calibration/target_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/imu_file.hpp"
@@ -257,7 +257,7 @@ int calibrate(const Arguments& a) {
     return kInterrupted;
   }
   if (a.save_detections)
-    if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
+    if (Result<void> done = write_file_atomically(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
       return fail(done.error().message);
   return conclude(a, *board, *material);
 }
@@ -282,12 +282,32 @@ int measure_noise(const Arguments& a) {
   std::filesystem::create_directories(a.out, error);
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   const std::string text = imu_noise_to_kalibr(*found, "/imu0");
-  if (Result<void> done = write_text(a.out + "/imu.yaml", text); !done) return fail(done.error().message);
+  if (Result<void> done = write_file_atomically(a.out + "/imu.yaml", text); !done) return fail(done.error().message);
   if (a.quiet) return kOk;
   fmt::print("{:.1f} s at rest\n{}", found->duration_s, text);
   for (const std::string& warning : found->warnings) fmt::print("note: {}\n", warning);
   fmt::print("written to {}\n", bold(a.out + "/imu.yaml"));
   return kOk;
+}
+
+/// What is estimated, and from how much.
+void add_solver_options(CLI::App& command, Arguments& a) {
+  command
+      .add_option("--model", a.models,
+                  "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  command.add_flag("--cameras-only", a.cameras_only, "leave the IMU out");
+  command.add_flag("--imu-axes", a.imu_options.imu_axes, "estimate scale and axes of the IMU, too");
+  command.add_flag("--camera-offsets", a.imu_options.camera_offsets, "estimate a time offset of each camera, too");
+  command.add_flag("--line-delay", a.imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
+  command.add_option("--gravity", a.imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
+      ->capture_default_str();
+  command.add_option("--max-views", a.max_views, "stamps that enter the adjustment of the cameras")
+      ->check(CLI::Range(10, 100000))
+      ->capture_default_str();
+  command.add_option("--threads", a.threads, "threads that look for the board")->check(CLI::Range(1, 64))->capture_default_str();
 }
 
 }  // namespace
@@ -318,18 +338,7 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");
   command->add_option("--imu-calibration", a->imu_calibration, "the IMU's noise: Kalibr's imu.yaml");
-  command
-      ->add_option("--model", a->models,
-                   "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  command->add_flag("--cameras-only", a->cameras_only, "leave the IMU out");
-  command->add_flag("--imu-axes", a->imu_options.imu_axes, "estimate scale and axes of the IMU, too");
-  command->add_flag("--camera-offsets", a->imu_options.camera_offsets, "estimate a time offset of each camera, too");
-  command->add_flag("--line-delay", a->imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
-  command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
-      ->capture_default_str();
+  add_solver_options(*command, *a);
   command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest, or in imu0/data.csv");
   CLI::Option* from_flight = command->add_option(
       "--from-flight", a->from_flight, "recordings that `fbvins run` reads, whose calibration they refine, without a board");
@@ -338,12 +347,6 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command
       ->add_option("--calibration", a->calibration, "with --from-flight: the calibration given, instead of the recordings' own")
       ->needs(from_flight);
-  command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")
-      ->check(CLI::Range(10, 100000))
-      ->capture_default_str();
-  command->add_option("--threads", a->threads, "threads that look for the board")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
   command->add_flag("--save-detections", a->save_detections, "write detections.csv");
   command->add_option("--out", a->out, "folder for the results")->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors");

@@ -2,12 +2,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/config_arguments.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/config/config_file.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/option_tiers.hpp"
 #include "fbvins/config/yaml.hpp"
@@ -23,9 +22,8 @@ constexpr const char* kExamples = R"(examples:
 )";
 
 struct Arguments {
-  std::string file;
-  std::vector<std::string> assignments;
-  bool all = false, defaults = false, yaml = false;
+  ConfigArguments config;
+  bool all = false, yaml = false;
 };
 
 void print_table(const std::vector<OptionField>& fields) {
@@ -41,7 +39,7 @@ void print_table(const std::vector<OptionField>& fields) {
 }
 
 int show(const Arguments& arguments) {
-  auto config = arguments.defaults ? Config{} : load_config(arguments.file, arguments.assignments);
+  auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
   std::vector<OptionField> fields = fields_of(*config);
   if (!arguments.all) fields = user_fields(fields);
@@ -56,11 +54,7 @@ void add_config_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("config", "print options with value, unit, range and meaning");
   command->footer(kExamples);
-  auto* file = command->add_option("--config", arguments->file, "YAML file that changes the defaults");
-  auto* set = command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
-                  ->take_all()
-                  ->allow_extra_args(false);
-  command->add_flag("--defaults", arguments->defaults, "the defaults (as without any argument)")->excludes(file)->excludes(set);
+  arguments->config.add_to(*command);
   command->add_flag("--all", arguments->all, "options for experts as well as those for users");
   command->add_flag("--yaml", arguments->yaml, "as a configuration file");
   command->callback([arguments, &exit_code] { exit_code = show(*arguments); });

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -10,12 +9,11 @@
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
 #include "apps/open_recording.hpp"
-#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/calibration_files.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/doctor/corrected_rig.hpp"
 #include "fbvins/io/calibration.hpp"
-#include "fbvins/io/output_file.hpp"
 #include "fbvins/io/png_encode.hpp"
 
 namespace fbvins::app {
@@ -65,10 +63,8 @@ Result<void> write_masks(const Diagnosis& diagnosis, const std::string& folder) 
     if (!diagnosis.masks[i]) continue;
     std::error_code ignored;  // then the file cannot be written
     std::filesystem::create_directories(folder, ignored);
-    Result<OutputFile> file = OutputFile::create(fmt::format("{}/mask{}.png", folder, i));
-    if (!file) return file.error();
-    file->write(encode_png(diagnosis.masks[i]->image()));
-    if (Result<void> done = file->close(); !done) return done;
+    const std::string png = encode_png(diagnosis.masks[i]->image());
+    if (Result<void> done = write_file_atomically(fmt::format("{}/mask{}.png", folder, i), png); !done) return done;
   }
   return {};
 }
@@ -112,7 +108,7 @@ Result<void> write_calibration(CorrectedRig& corrected, const std::string& file)
     corrected.why_not = read.error().message;
     return {};
   }
-  return write_text(file, text);
+  return write_file_atomically(file, text);
 }
 
 bool same_file(const std::string& a, const std::string& b) {

@@ -15,6 +15,7 @@
 #include "apps/terminal.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/frontend/survival.hpp"
 #include "fbvins/loop/loop_map.hpp"
 
@@ -160,15 +161,15 @@ Result<void> write_as_run(const Arguments& a, const Config& config, const Flight
   summary.wall_s = wall_s;
   if (Result<void> done = write_run(flight.run, a.out); !done) return done;
   if (Result<void> done = write_truth(flight.run.images(), truth, a.out); !done) return done;
-  if (Result<void> done = write_text(a.out + "/config.yaml", to_yaml(config)); !done) return done;
-  if (Result<void> done = write_text(a.out + "/summary.json", to_json_text(summary)); !done) return done;
-  return write_text(a.out + "/summary.txt", to_text(summary));
+  if (Result<void> done = write_file_atomically(a.out + "/config.yaml", to_yaml(config)); !done) return done;
+  if (Result<void> done = write_file_atomically(a.out + "/summary.json", to_json_text(summary)); !done) return done;
+  return write_file_atomically(a.out + "/summary.txt", to_text(summary));
 }
 
 /// The gains that were flown.
 Result<void> write_control(const FlightSetup& setup, const std::string& out) {
   ControlOptions control = setup.control;
-  return write_text(out + "/control.yaml", write_yaml(fields_of(control)));
+  return write_file_atomically(out + "/control.yaml", write_yaml(fields_of(control)));
 }
 
 int fly_mission(Arguments a) {
@@ -189,8 +190,8 @@ int fly_mission(Arguments a) {
   const FlightFacts facts{a.mission_name(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, setup->controller.kind};
   for (const Result<void>& done :
        {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out), write_control(*setup, a.out),
-        write_text(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
-        write_text(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
+        write_file_atomically(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
+        write_file_atomically(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
     if (!done) return fail(done.error().message);
   if (!a.quiet) fmt::print("{}results in {}\n", flight_text(facts, flight->log, summary), bold(a.out));
   return summary.arrived ? kOk : kEstimationFailed;

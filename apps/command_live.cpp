@@ -20,6 +20,7 @@
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
 #include "apps/web_page.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/reset_counter_sink.hpp"
@@ -107,14 +108,14 @@ Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault
 }
 
 Result<void> write_results(const std::string& folder, const Config& config, const Source& source, const LiveSummary& summary) {
-  if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
+  if (Result<void> done = write_file_atomically(folder + "/config.yaml", to_yaml(config)); !done) return done;
   if (const auto* replay = dynamic_cast<const ReplaySource*>(&source); replay && replay->dataset().has_ground_truth()) {
     std::vector<Time> images;
     for (const FrameEntry& frame : replay->dataset().frames()) images.push_back(frame.t);
     if (Result<void> done = write_truth(images, replay->dataset().ground_truth(), folder); !done) return done;
   }
-  if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
-  return write_text(folder + "/summary.txt", to_text(summary));
+  if (Result<void> done = write_file_atomically(folder + "/summary.json", to_json_text(summary)); !done) return done;
+  return write_file_atomically(folder + "/summary.txt", to_text(summary));
 }
 
 Result<std::unique_ptr<Source>> source_of(const Arguments& arguments, const RosGraph& graph) {
@@ -213,8 +214,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("--source", arguments->source, "where sensor data come from")->required();
   arguments->config.add_to(*command);
-  OutputArguments& outputs = arguments->outputs;
-  command->add_option("--out", outputs.out, "folder for the results; without it no files are written");
+  arguments->outputs.add_to(*command);
   command->add_option("--calibration", arguments->dataset.kalibr_camchain,
                       "Kalibr camchain-imucam.yaml instead of the source's own");
   command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
@@ -227,53 +227,24 @@ void add_live_command(CLI::App& program, int& exit_code) {
                    "ms by which the stamps of images that are taken at once may differ")
       ->check(CLI::Range(0.0, 1000.0));
   command->add_flag("--preload", arguments->preload, "replay: decode all images before the clock starts");
-  command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
-  command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
-  command->add_option("--load-map", arguments->map.load, "map to relocalise in and extend; with loop closure");
+  arguments->map.add_to(*command);
   command
       ->add_option(
           "--map", arguments->kept_map,
           "a map kept from flight to flight: loaded if the file exists, kept every half minute and written at the end; with loop closure")
       ->excludes("--save-map")
       ->excludes("--load-map");
-  command->add_option("--tags", arguments->map.tags, kTagsHelp);
-  command->add_option("--vocabulary", arguments->map.vocabulary,
-                      "vocabulary file for loop closure, instead of the one that ships");
-  command
-      ->add_option("--mavlink", outputs.mavlink,
-                   "a flight controller to send poses to, udp:HOST:PORT[:OWN_PORT] or serial:DEVICE:BAUD; may be repeated")
-      ->take_all()
-      ->allow_extra_args(false);
   command->add_option("--ros2", arguments->ros2,
                       "publish ROS 2 topics: DOMAIN[:INTERFACE]; without an interface to this machine alone");
-  command
-      ->add_option("--reset-counter", outputs.reset_counter,
-                   "file that keeps the reset counter from process to process, so that a flight controller notices the new frame")
-      ->take_last();
   command
       ->add_option("--socket-group", arguments->socket_group,
                    "a Unix group that may connect to the sensors' socket; without it its owner alone")
       ->take_last();
-  command->add_option("--web", outputs.web, kWebHelp);
   command->add_option("--check", arguments->check_s, "check the sensors for this many seconds, print what is wrong, and end")
       ->check(CLI::PositiveNumber);
   command->add_option("--fault", arguments->faults, "sensor fault to inject (see below); may be repeated")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--record", outputs.record,
-                      "MCAP file for the flight record, or the next number where it exists; it is a recording for fbvins run");
-  command
-      ->add_option("--record-keep-free", outputs.record_keep_free_mb,
-                   "MB of its disk that the record leaves free for maps; it ends before")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command
-      ->add_flag("--record-on-request", outputs.record_on_request,
-                 "do not begin the record with the flight, but when start_record is called (docs/ros2.md)")
-      ->needs("--record");
-  command->add_flag("!--record-no-images", outputs.record_images,
-                    "leave images out of the record, which cannot be run again then");
-  command->add_flag("--quiet", outputs.quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] {
     arguments->map = map_arguments(*arguments);
     exit_code = run(*arguments);

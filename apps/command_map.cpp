@@ -11,7 +11,7 @@
 #include "apps/commands.hpp"
 #include "apps/map_edit_commands.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/io/output_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_journal.hpp"
 #include "fbvins/loop/map_merge.hpp"
@@ -103,11 +103,8 @@ int merge(const Arguments& arguments) {
   return kOk;
 }
 
-int write_text(const std::string& path, const std::string& text) {
-  auto file = OutputFile::create(path);
-  if (!file) return fail(file.error().message);
-  file->write(text);
-  if (auto closed = file->close(); !closed) return fail(closed.error().message);
+int write(const std::string& path, const std::string& text) {
+  if (auto written = write_file_atomically(path, text); !written) return fail(written.error().message);
   fmt::print("{}\n", path);
   return kOk;
 }
@@ -117,8 +114,8 @@ int export_files(const Arguments& arguments) {
   const auto map = load_map(arguments.file);
   if (!map) return fail(map.error().message);
   int code = kOk;
-  if (!arguments.ply.empty()) code = write_text(arguments.ply, map_as_ply(*map));
-  if (code == kOk && !arguments.tum.empty()) code = write_text(arguments.tum, map_as_tum(*map));
+  if (!arguments.ply.empty()) code = write(arguments.ply, map_as_ply(*map));
+  if (code == kOk && !arguments.tum.empty()) code = write(arguments.tum, map_as_tum(*map));
   return code;
 }
 

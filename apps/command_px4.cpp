@@ -7,7 +7,7 @@
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/io/output_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/live/parameter_reader.hpp"
 #include "fbvins/mavlink/px4_parameters.hpp"
 
@@ -44,10 +44,7 @@ int print_parameters(const Arguments& arguments) {
     fmt::print("{}", text);
     return kOk;
   }
-  auto file = OutputFile::create(arguments.output);
-  if (!file) return fail(file.error().message);
-  file->write(text);
-  if (Result<void> done = file->close(); !done) return fail(done.error().message);
+  if (Result<void> done = write_file_atomically(arguments.output, text); !done) return fail(done.error().message);
   return kOk;
 }
 

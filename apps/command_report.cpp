@@ -22,12 +22,12 @@ examples:
 
 struct Arguments {
   std::vector<std::string> runs;
-  std::string out = "report.html", truth, title;
+  std::string out = "report.html", truth;
   bool quiet = false;
 };
 
 int write(const Arguments& arguments) {
-  const auto written = write_report(arguments.runs, arguments.out, arguments.truth, arguments.title);
+  const auto written = write_report(arguments.runs, arguments.out, arguments.truth);
   if (!written) return fail(written.error().message);
   for (const std::string& warning : *written) warn(warning);
   if (!arguments.quiet) fmt::print("report: {}\n", bold(std::filesystem::absolute(arguments.out).lexically_normal().string()));
@@ -43,7 +43,6 @@ void add_report_command(CLI::App& program, int& exit_code) {
   command->add_option("RUN", arguments->runs, "folders of fbvins run")->required();
   command->add_option("-o,--out", arguments->out, "the page")->capture_default_str();
   command->add_option("--truth", arguments->truth, "recording or trajectory file with the truth of all these runs");
-  command->add_option("--title", arguments->title, "heading of the page (default: the recordings' names)");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = write(*arguments); });
 }

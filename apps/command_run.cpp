@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 
@@ -95,17 +94,12 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--threaded", arguments->flight.threaded, "frontend and estimator on threads of their own; the same result");
-  command->add_flag("--loop", arguments->flight.map.loop, "loop closure: a map beside the odometry");
-  command->add_option("--save-map", arguments->flight.map.save, "file for the map after the run; with loop closure");
-  command->add_option("--load-map", arguments->flight.map.load, "map to relocalise in and extend; with loop closure");
+  arguments->flight.map.add_to(*command);
   command->add_flag("--final-ba", arguments->flight.map.final_ba,
                     "bundle adjustment over the whole map after the run; with loop closure");
   command->add_flag("--boosted-map", arguments->flight.map.boosted, "a new map of boosted descriptors; with loop closure");
-  command->add_option("--vocabulary", arguments->flight.map.vocabulary,
-                      "vocabulary file for loop closure, instead of the one that ships");
   command->add_option("--positions", arguments->flight.map.positions,
                       "CSV of positions or heights in the building's frame; with loop closure (docs/maps.md)");
-  command->add_option("--tags", arguments->flight.map.tags, kTagsHelp);
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -2,16 +2,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/boards/hung_tags.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 
@@ -31,11 +30,14 @@ examples:
   fbvins simulate dim --options > dim.yaml          every option of a preset with unit, range and meaning
 )";
 
+/// Edge of a tag's black square.
+constexpr double kTagSize_m = 0.2;
+
 struct Arguments {
   std::string preset = "normal", config, out, trajectory, imu;
   std::vector<std::string> assignments;
   int seed = -1, max_images = 0, tags = 0;
-  double seconds = 0, tag_size_m = 0.2;
+  double seconds = 0;
   bool options = false, depth = false, landmarks = false, quiet = false;
 };
 
@@ -57,7 +59,7 @@ Result<SimulationOptions> options_of(const Arguments& arguments) {
 }
 
 Result<void> write_options(SimulationOptions options, const std::string& folder) {
-  return write_text(folder + "/simulation.yaml", write_yaml(fields_of(options)));
+  return write_file_atomically(folder + "/simulation.yaml", write_yaml(fields_of(options)));
 }
 
 int simulate_flight(const Arguments& arguments) {
@@ -70,7 +72,7 @@ int simulate_flight(const Arguments& arguments) {
   if (arguments.out.empty()) return fail("--out FOLDER is needed");
   Result<TagSurvey> tags = TagSurvey{};
   Result<Simulation> simulation = prepare_simulation(*options, [&](World& world, const Simulation& s) {
-    if (arguments.tags > 0) tags = hang_tags(world, s, arguments.tags, arguments.tag_size_m);
+    if (arguments.tags > 0) tags = hang_tags(world, s, arguments.tags, kTagSize_m);
   });
   if (!simulation) return fail(simulation.error().message);
   if (!tags) return fail(tags.error().message);
@@ -80,7 +82,7 @@ int simulate_flight(const Arguments& arguments) {
   const Result<void> written = write_euroc(*simulation, arguments.out, writer, [&](int done, int) { progress.update(done); });
   if (!written) return fail(written.error().message);
   if (arguments.tags > 0)
-    if (Result<void> saved = write_text(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
+    if (Result<void> saved = write_file_atomically(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
       return fail(saved.error().message);
   if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
   if (!arguments.quiet)
@@ -108,10 +110,9 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU readings, used unchanged (EuRoC CSV)");
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--tags", arguments->tags, "hang so many AprilTags on walls, their poses in tags.yaml (docs/maps.md)")
+  command
+      ->add_option("--tags", arguments->tags, "hang so many AprilTags of 0.2 m on walls, their poses in tags.yaml (docs/maps.md)")
       ->check(CLI::Range(0, 100));
-  command->add_option("--tag-size", arguments->tag_size_m, "edge of a tag's black square, m (default 0.2)")
-      ->check(CLI::Range(0.02, 2.0));
   command->add_flag("--depth", arguments->depth, "write left depth images in millimetres, too");
   command->add_flag("--landmarks", arguments->landmarks, "write the corners of the world's surfaces, too");
   command->add_flag("--options", arguments->options, "print the effective options and stop");

@@ -71,11 +71,6 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->add_option("--rate", a->options.image_rate_hz, "images a second")
       ->check(CLI::Range(0.5, 200.0))
       ->capture_default_str();
-  command->add_option("--exposure", a->options.exposure_ms, "ms, in which the motion blurs")
-      ->check(CLI::Range(0.0, 50.0))
-      ->capture_default_str();
-  command->add_option("--blur", a->options.blur_px, "px, of the lens")->check(CLI::Range(0.0, 5.0))->capture_default_str();
-  command->add_option("--noise", a->options.noise, "grey values")->check(CLI::Range(0.0, 50.0))->capture_default_str();
   command->add_option("--time-offset", a->options.time_offset_ms, "ms, IMU's stamp less image's")
       ->check(CLI::Range(-400.0, 400.0))
       ->capture_default_str();

@@ -6,10 +6,10 @@
 #include <memory>
 
 #include "apps/commands.hpp"
-#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/target_drawing.hpp"
 #include "fbvins/calibration/target_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -45,8 +45,9 @@ int make_target(const Arguments& a) {
   const std::filesystem::path folder = std::filesystem::path(a.out).parent_path();
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
   if (error) return fail(fmt::format("{}: {}", folder.string(), error.message()));
-  for (const Result<void>& done : {write_text(a.out + ".pdf", to_pdf(*page)), write_text(a.out + ".svg", to_svg(*page)),
-                                   write_text(a.out + ".yaml", target_to_yaml(board))})
+  for (const Result<void>& done :
+       {write_file_atomically(a.out + ".pdf", to_pdf(*page)), write_file_atomically(a.out + ".svg", to_svg(*page)),
+        write_file_atomically(a.out + ".yaml", target_to_yaml(board))})
     if (!done) return fail(done.error().message);
   fmt::print("{} on {}: {}, and .svg, .yaml\nprint it without scaling, then measure the rulers\n", board.describe(), a.paper,
              bold(a.out + ".pdf"));

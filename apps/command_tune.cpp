@@ -8,6 +8,7 @@
 #include "apps/commands.hpp"
 #include "apps/run_summary.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/tuning/tune_report.hpp"
 
 namespace fbvins::app {
@@ -42,9 +43,9 @@ int tune_gains(const Arguments& a) {
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   const std::string text = tuning_text(tuning, a.options);
   for (const Result<void>& done :
-       {write_text(a.out + "/control.yaml", control_yaml(tuning.proposed)),
-        write_text(a.out + "/gains.params", px4_parameter_file(tuning)), write_text(a.out + "/tuning.txt", text),
-        write_text(a.out + "/tuning.svg", tuning_svg(tuning))})
+       {write_file_atomically(a.out + "/control.yaml", control_yaml(tuning.proposed)),
+        write_file_atomically(a.out + "/gains.params", px4_parameter_file(tuning)),
+        write_file_atomically(a.out + "/tuning.txt", text), write_file_atomically(a.out + "/tuning.svg", tuning_svg(tuning))})
     if (!done) return fail(done.error().message);
   if (!a.quiet) fmt::print("{}results in {}\n", text, bold(a.out));
   return kOk;

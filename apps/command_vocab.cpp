@@ -30,7 +30,6 @@ struct Arguments {
   std::vector<std::string> images;
   std::string output = "orb_vocabulary.fbv", file;
   bool boosted = false;
-  OrbOptions orb{.max_features = 800, .levels = 6};
   VocabularyTrainingOptions training;
 };
 
@@ -60,7 +59,7 @@ int train(const Arguments& arguments) {
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (arguments.boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return fail(stage.error().message);
-  OrbExtractor extractor(arguments.orb, (*stage)->changes_descriptors());
+  OrbExtractor extractor(OrbOptions{.max_features = 800, .levels = 6}, (*stage)->changes_descriptors());
   OrbFeatures features;
   std::vector<std::vector<Descriptor>> images;
   std::size_t descriptors = 0;
@@ -101,10 +100,6 @@ void add_vocab_command(CLI::App& program, int& exit_code) {
   training->add_option("images", arguments->images, "images or folders")->required()->check(CLI::ExistingPath);
   training->add_option("-o,--output", arguments->output, "the file to write");
   training->add_flag("--boosted", arguments->boosted, "use boosted descriptors");
-  training->add_option("--features", arguments->orb.max_features, "most ORB features in an image");
-  training->add_option("--branching", arguments->training.branching, "children of a node");
-  training->add_option("--depth", arguments->training.depth, "levels of the tree");
-  training->add_option("--min-members", arguments->training.min_members, "a node with fewer descriptors is not split");
   training->add_option("--seed", arguments->training.seed, "seed of the initial cluster centres");
   training->callback([arguments, &exit_code] { exit_code = train(*arguments); });
   CLI::App* looking = command->add_subcommand("info", "what is in a vocabulary file");

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/calibration_report.hpp"
-#include "apps/run_output.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/core/atomic_file.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -109,7 +109,7 @@ Result<void> write_flight_calibration(const FlightCalibration& found, const std:
   files.insert(files.end(),
                {{"summary.json", flight_calibration_json(found, runs)}, {"calibration.txt", flight_calibration_text(found)}});
   for (const auto& [name, text] : files)
-    if (Result<void> done = write_text(folder + "/" + name, text); !done) return done;
+    if (Result<void> done = write_file_atomically(folder + "/" + name, text); !done) return done;
   return {};
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The commands of a flight without sensors: what they need, and what they say. With sensors: tests/ros2_peer.py.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -9,6 +8,7 @@
 
 #include "apps/live_outputs.hpp"
 #include "apps/no_sensors.hpp"
+#include "apps/test_files.hpp"
 
 namespace fbvins::app {
 namespace flight_commands_test {
@@ -18,17 +18,12 @@ namespace fs = std::filesystem;
 class FlightCommands : public ::testing::Test {
  protected:
   FlightCommands() {
-    fs::create_directories(folder);
     ::unsetenv("NOTIFY_SOCKET");
     outputs.quiet = true;
     outputs.record_keep_free_mb = 0;
     auto made = LiveSystem::create(config, config.live, source.rig());
     EXPECT_TRUE(made);
     live.emplace(std::move(*made));
-  }
-  ~FlightCommands() override {
-    live.reset();
-    fs::remove_all(folder);
   }
 
   /// What the command tells: "+" or "-", and the sentence.
@@ -41,7 +36,8 @@ class FlightCommands : public ::testing::Test {
   }
   void add() { ASSERT_TRUE(add_outputs(outputs, flight, *live, totals, troubles)); }
 
-  const std::string folder = ::testing::TempDir() + "/fbvins_flight_commands_" + std::to_string(getpid());
+  const test::Folder own_folder{"flight_commands"};
+  const std::string folder = own_folder.path();
   Config config;
   test::NoSensors source;
   MapArguments map;

@@ -12,9 +12,9 @@
 
 #include "apps/open_source.hpp"
 #include "apps/ros_graph.hpp"
-#include "apps/run_output.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/imu_file.hpp"
 
 namespace fbvins::app {
@@ -165,14 +165,14 @@ class GuidedCalibration::Session {
       return Error{ErrorCode::invalid_argument, fmt::format("{}: no image showed the board", options_.source)};
     const std::string corners = options_.out + "/detections.csv", readings = options_.out + "/imu0.csv";
     const std::string text = detections_to_csv(recorded.detections);
-    if (Result<void> done = write_text(corners, text); !done) return done.error();
+    if (Result<void> done = write_file_atomically(corners, text); !done) return done.error();
     GuidedRecording out;
     Result<Detections> detections = parse_detections(text, corners);
     if (!detections) return detections.error();
     out.detections = *std::move(detections);
     if (options_.sizes.empty()) out.imu_noise = source_->rig().imu_noise;
     if (recorded.imu.empty()) return out;
-    if (Result<void> done = write_text(readings, imu_to_csv(recorded.imu)); !done) return done.error();
+    if (Result<void> done = write_file_atomically(readings, imu_to_csv(recorded.imu)); !done) return done.error();
     Result<std::vector<ImuSample>> imu = read_imu_csv(readings);
     if (!imu) return imu.error();
     out.imu = *std::move(imu);

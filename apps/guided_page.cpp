@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <cmath>
 #include <mutex>
 #include <nlohmann/json.hpp>
 

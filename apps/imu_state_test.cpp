@@ -2,9 +2,10 @@
 #include "apps/imu_state.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
+
+#include "apps/test_files.hpp"
 
 namespace fbvins::app {
 namespace imu_state_test {
@@ -34,16 +35,17 @@ TEST(ImuStateOfAFlight, WithoutAPathOrAStateNothingIsReadOrWritten) {
   ASSERT_TRUE(none);
   EXPECT_FALSE(*none);
   EXPECT_TRUE(save_imu_state("", imu_state_of(with_bias()), ImuNoise{}));
-  const std::string path = ::testing::TempDir() + "/fbvins_no_imu_state_" + std::to_string(getpid());
+  const test::Folder folder("no_imu_state");
+  const std::string path = folder.path() + "/imu.yaml";
   EXPECT_TRUE(save_imu_state(path, std::nullopt, ImuNoise{}));
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
 TEST(ImuStateOfAFlight, ComesBack) {
-  const std::string path = ::testing::TempDir() + "/fbvins_imu_state_" + std::to_string(getpid());
+  const test::Folder folder("imu_state");
+  const std::string path = folder.path() + "/imu.yaml";
   ASSERT_TRUE(save_imu_state(path, imu_state_of(with_bias()), ImuNoise{}));
   const auto loaded = load_imu_state(path, ImuNoise{});
-  std::filesystem::remove(path);
   ASSERT_TRUE(loaded) << loaded.error().message;
   ASSERT_TRUE(*loaded);
   EXPECT_EQ((*loaded)->biases.bias.gyro_radps, with_bias().bias.gyro_radps);

@@ -2,13 +2,14 @@
 #include "apps/kept_map.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <vector>
+
+#include "apps/test_files.hpp"
 
 namespace fbvins::app {
 namespace kept_map_test {
@@ -199,16 +200,14 @@ TEST_F(KeptMapTest, WhatIsAskedForIsDoneBeforeTheNextKeyframe) {
 
 class MakeKeptMap : public ::testing::Test {
  protected:
-  MakeKeptMap() { std::filesystem::create_directories(folder); }
-  ~MakeKeptMap() override { std::filesystem::remove_all(folder); }
-
   static StereoRig rig() {
     StereoRig r;
     r.left = r.right = Camera(PinholeRadtan{400, 400, 376, 240}, 752, 480);
     r.T_BC1.p = Vec3(0.1, 0, 0);
     return r;
   }
-  const std::string folder = ::testing::TempDir() + "/fbvins_kept_map_" + std::to_string(getpid());
+  const test::Folder own_folder{"kept_map"};
+  const std::string folder = own_folder.path();
   const std::string file = folder + "/flat.fbm";
 };
 

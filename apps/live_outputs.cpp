@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -62,6 +63,33 @@ std::optional<Quat> vehicle_axes(const MountingOptions& options) {
 }
 
 }  // namespace
+
+void OutputArguments::add_to(CLI::App& command) {
+  command.add_option("--out", out, "folder for the results; without it no files are written");
+  command
+      .add_option("--mavlink", mavlink,
+                  "a flight controller to send poses to, udp:HOST:PORT[:OWN_PORT] or serial:DEVICE:BAUD; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
+  command
+      .add_option("--reset-counter", reset_counter,
+                  "file that keeps the reset counter from process to process, so that a flight controller notices the new frame")
+      ->take_last();
+  command.add_option("--web", web, kWebHelp);
+  command.add_option("--record", record,
+                     "MCAP file for the flight record, or the next number where it exists; it is a recording for fbvins run");
+  command
+      .add_option("--record-keep-free", record_keep_free_mb,
+                  "MB of its disk that the record leaves free for maps; it ends before")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      .add_flag("--record-on-request", record_on_request,
+                "do not begin the record with the flight, but when start_record is called (docs/ros2.md)")
+      ->needs("--record");
+  command.add_flag("!--record-no-images", record_images, "leave images out of the record, which cannot be run again then");
+  command.add_flag("--quiet", quiet, "print nothing but errors and warnings");
+}
 
 void Troubles::add(const Error& error) {
   (void)fail(error.message);

@@ -3,8 +3,6 @@
 // goes on without it. Only a wrong command line ends the program.
 #pragma once
 
-#include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +14,10 @@
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/record_switch.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace fbvins::app {
 
 struct OutputArguments {
@@ -24,6 +26,8 @@ struct OutputArguments {
   bool record_images = true, quiet = false;
   bool record_on_request = false;  ///< the record does not begin by itself
   double record_keep_free_mb = 256;
+
+  void add_to(CLI::App& command);
 };
 
 /// What went wrong with outputs, said at once on stderr. One thread.

@@ -2,13 +2,13 @@
 #include "apps/live_outputs.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
 #include "apps/no_sensors.hpp"
+#include "apps/test_files.hpp"
 #include "fbvins/io/imu_state_file.hpp"
 
 namespace fbvins::app {
@@ -19,11 +19,9 @@ namespace fs = std::filesystem;
 class LiveOutputs : public ::testing::Test {
  protected:
   LiveOutputs() {
-    fs::create_directories(folder);
     ::unsetenv("NOTIFY_SOCKET");
     arguments.quiet = true;
   }
-  ~LiveOutputs() override { fs::remove_all(folder); }
 
   LiveSystem live() {
     auto made = LiveSystem::create(config, config.live, source.rig());
@@ -35,7 +33,8 @@ class LiveOutputs : public ::testing::Test {
     return add_outputs(arguments, flight, to, totals, troubles);
   }
 
-  const std::string folder = ::testing::TempDir() + "/fbvins_live_outputs_" + std::to_string(getpid());
+  const test::Folder own_folder{"live_outputs"};
+  const std::string folder = own_folder.path();
   Config config;
   test::NoSensors source;
   MapArguments map;

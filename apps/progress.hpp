@@ -8,26 +8,43 @@
 
 namespace fbvins::app {
 
+/// The bar of any job.
+class ProgressBar {
+ public:
+  /// quiet: say nothing at all.
+  explicit ProgressBar(bool quiet);
+  /// Removes the bar from the terminal.
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  bool on_terminal() const { return terminal_; }
+  /// `share` of the job, 0 to 1, with a text behind it; elsewhere than on a terminal the text alone.
+  void draw(double share, const std::string& text) const;
+  double elapsed_s() const;
+  /// "5 s left" for what `remains` where `done` took the time until now; nothing where none of either is.
+  std::string left(double done, double remains) const;
+
+ private:
+  bool quiet_, terminal_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+/// Of a job whose steps are frames.
 class Progress {
  public:
-  /// total: number of steps; quiet: say nothing at all.
   Progress(int total, bool quiet);
-  /// Removes the bar from the terminal.
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
 
   void update(int done);
   /// So many steps were done before: the time left is that of the others.
   void begin_at(int done) { begun_at_ = done; }
-  double elapsed_s() const;
+  double elapsed_s() const { return bar_.elapsed_s(); }
 
  private:
-  std::string describe(int done, double elapsed) const;
+  void draw(int done) const;
 
   int total_;
-  bool quiet_, terminal_;
-  std::chrono::steady_clock::time_point start_;
+  ProgressBar bar_;
   double last_drawn_s_ = -1;
   int last_tenth_ = 0;
   int begun_at_ = 0;

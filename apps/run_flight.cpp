@@ -9,6 +9,7 @@
 #include "apps/imu_state.hpp"
 #include "fbvins/checkup/first_seconds.hpp"
 #include "fbvins/config/config_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/features/booster.hpp"
 #include "fbvins/pipeline/system.hpp"
 
@@ -128,9 +129,9 @@ Result<void> write_flight(const Flight& flight, const RunSummary& summary, const
   if (Result<void> done = write_run(flight.run, folder); !done) return done;
   if (flight.map)
     if (Result<void> done = write_map_record(*flight.map, folder); !done) return done;
-  if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
-  if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
-  if (Result<void> done = write_text(folder + "/summary.txt", to_text(summary)); !done) return done;
+  if (Result<void> done = write_file_atomically(folder + "/config.yaml", to_yaml(config)); !done) return done;
+  if (Result<void> done = write_file_atomically(folder + "/summary.json", to_json_text(summary)); !done) return done;
+  if (Result<void> done = write_file_atomically(folder + "/summary.txt", to_text(summary)); !done) return done;
   return truth.empty() ? Result<void>{} : write_truth(flight.run.images(), truth, folder);
 }
 

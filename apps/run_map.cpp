@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/tag_finder.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/io/anchor_file.hpp"
 #include "fbvins/io/trajectory.hpp"
@@ -110,6 +112,15 @@ std::vector<MapSummary::Found> found_again(const MapRecord& record, const RunRec
 
 }  // namespace
 
+void MapArguments::add_to(CLI::App& command) {
+  command.add_flag("--loop", loop, "loop closure: a map beside the odometry");
+  command.add_option("--save-map", save, "file for the map at the end; with loop closure");
+  command.add_option("--load-map", load, "map to relocalise in and extend; with loop closure");
+  command.add_option("--tags", tags,
+                     "YAML of AprilTags, at known places in the building or anywhere; with loop closure (docs/maps.md)");
+  command.add_option("--vocabulary", vocabulary, "vocabulary file for loop closure, instead of the one that ships");
+}
+
 Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const StereoRig& rig, const LoopOptions& options) {
   if (!arguments.wanted()) return std::unique_ptr<LoopMap>();
   if (!arguments.save.empty())
@@ -161,7 +172,7 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
   if (Result<void> done = write_tum(record.bounded, folder + "/map_bounded_tum.txt"); !done) return done;
   std::string text = kUpdatesHeader;
   for (const MapUpdate& u : record.updates) text += row_of(u);
-  return write_text(folder + "/map_updates.csv", text);
+  return write_file_atomically(folder + "/map_updates.csv", text);
 }
 
 MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory<W>& truth) {

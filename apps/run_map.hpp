@@ -15,12 +15,18 @@
 #include "fbvins/loop/loop_map.hpp"
 #include "fbvins/types/loop.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace fbvins::app {
 
 struct MapArguments {
   bool loop = false, final_ba = false, boosted = false;
   std::string load, save, vocabulary;
   std::string positions = {}, tags = {};  ///< files of anchors
+  /// The options that commands with maps share.
+  void add_to(CLI::App& command);
   bool wanted() const { return loop || final_ba || !load.empty() || !save.empty() || !positions.empty() || !tags.empty(); }
 };
 
@@ -43,8 +49,6 @@ struct MapRecord {
 
 /// The anchors of --positions, in order of time; none without it.
 Result<std::vector<Anchor>> positions_of(const MapArguments& arguments);
-inline constexpr const char* kTagsHelp =
-    "YAML of AprilTags, at known places in the building or anywhere; with loop closure (docs/maps.md)";
 /// The map itself or, with --tags, one that finds them in its keyframes, which is kept in `with_tags`.
 Result<Mapper*> mapper_of(const MapArguments& arguments, const StereoRig& rig, LoopMap* map, std::unique_ptr<Mapper>& with_tags);
 

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <utility>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/trajectory.hpp"
 
 namespace fbvins::app {
@@ -109,13 +110,6 @@ std::vector<Time> RunRecord::images() const {
   return stamps;
 }
 
-Result<void> write_text(const std::string& path, const std::string& text) {
-  auto file = OutputFile::create(path);
-  if (!file) return file.error();
-  file->write(text);
-  return file->close();
-}
-
 struct RunWriter::State {
   TumWriter tum;
   OdometryCsvWriter csv;
@@ -214,7 +208,7 @@ Result<void> write_truth(const std::vector<Time>& images, const std::vector<Traj
     for (auto p = std::max(next, from); p < to; ++p) text += truth_row(*p);
     next = std::max(next, to);
   }
-  return write_text(folder + "/ground_truth.csv", text);
+  return write_file_atomically(folder + "/ground_truth.csv", text);
 }
 
 }  // namespace fbvins::app

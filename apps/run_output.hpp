@@ -56,7 +56,5 @@ class RunWriter {
 Result<void> write_run(const RunRecord& record, const std::string& folder);
 /// The recording's truth around each image, so that a report needs nothing but this folder.
 Result<void> write_truth(const std::vector<Time>& images, const std::vector<TrajectoryPoint>& truth, const std::string& folder);
-/// One small file in one go.
-Result<void> write_text(const std::string& path, const std::string& text);
 
 }  // namespace fbvins::app

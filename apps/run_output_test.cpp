@@ -106,13 +106,5 @@ TEST(Truth, IsWhatLiesAroundTheImages) {
   EXPECT_EQ(test::columns(rows[0]), 8);
 }
 
-TEST(WriteText, ReplacesWhole) {
-  const test::Folder folder("text");
-  ASSERT_TRUE(write_text(folder.path() + "/a.txt", "one"));
-  ASSERT_TRUE(write_text(folder.path() + "/a.txt", "two"));
-  EXPECT_EQ(folder.text("a.txt"), "two");
-  EXPECT_FALSE(write_text(folder.path() + "/none/a.txt", "x"));
-}
-
 }  // namespace run_output_test
 }  // namespace fbvins::app

@@ -260,10 +260,37 @@ nb::dict counts_of(const PySystem& system) {
   return out;
 }
 
+/// What ties the map to a building.
+void bind_anchors(nb::class_<PySystem>& system) {
+  system
+      .def(
+          "push_position", &PySystem::push_position, "t"_a, "position"_a, "covariance"_a, "point"_a.none() = nb::none(),
+          nb::sig("def push_position(self, t: int, position: numpy.ndarray, covariance: float | numpy.ndarray, "
+                  "point: numpy.ndarray | None = None) -> None"),
+          "For the map: where a point of the body is in the building's frame, measured from outside. t in ns of the cameras' clock, "
+          "position (3,) in m, covariance a standard deviation in m or (3, 3) in m^2, point (3,) in m in B, None for its origin. "
+          "Best before the next images; one that is late by more than some seconds is not used. ValueError without a map and for "
+          "numbers that are impossible.")
+      .def("push_height", &PySystem::push_height, "t"_a, "height"_a, "sigma"_a, "point"_a.none() = nb::none(),
+           nb::sig("def push_height(self, t: int, height: float, sigma: float, point: numpy.ndarray | None = None) -> None"),
+           "The same of a height above z = 0 of the building alone, m.")
+      .def(
+          "push_tag", &PySystem::push_tag, "t"_a, "id"_a, "position"_a, "orientation"_a, "covariance"_a,
+          "place"_a.none() = nb::none(), "place_orientation"_a.none() = nb::none(),
+          nb::sig("def push_tag(self, t: int, id: int, position: numpy.ndarray, orientation: numpy.ndarray, "
+                  "covariance: numpy.ndarray, place: numpy.ndarray | None = None, "
+                  "place_orientation: numpy.ndarray | None = None) -> None"),
+          "The same of a tag that a detector of yours saw: position (3,) in m and orientation (4,) w, x, y, z of the tag in B, "
+          "covariance (6, 6) of (position in B, rotation in the tag); where it hangs in the building, or None: then it is a landmark, "
+          "which says where the vehicle is when it is seen again, in this flight or in another. The tag's frame: origin in its "
+          "middle, x to the right and y upwards as a viewer of the upright tag sees it, z towards the viewer.");
+}
+
 }  // namespace
 
 void bind_system(nb::module_& m) {
-  nb::class_<PySystem>(m, "System", nb::type_slots(kSlots))
+  nb::class_<PySystem> system(m, "System", nb::type_slots(kSlots));
+  system
       .def(nb::init<const Config&, const StereoRig&, bool, nb::object, nb::object, nb::object, const std::string&>(), "config"_a,
            "rig"_a, "threaded"_a = false, "map"_a = nb::none(), "on_odometry"_a = nb::none(), "on_map_update"_a = nb::none(),
            "imu_state"_a = "")
@@ -288,27 +315,6 @@ void bind_system(nb::module_& m) {
           "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")
       .def(
           "push", [](PySystem& s, const StereoFrame& frame) { s.push(frame); }, "event"_a)
-      .def(
-          "push_position", &PySystem::push_position, "t"_a, "position"_a, "covariance"_a, "point"_a.none() = nb::none(),
-          nb::sig("def push_position(self, t: int, position: numpy.ndarray, covariance: float | numpy.ndarray, "
-                  "point: numpy.ndarray | None = None) -> None"),
-          "For the map: where a point of the body is in the building's frame, measured from outside. t in ns of the cameras' clock, "
-          "position (3,) in m, covariance a standard deviation in m or (3, 3) in m^2, point (3,) in m in B, None for its origin. "
-          "Best before the next images; one that is late by more than some seconds is not used. ValueError without a map and for "
-          "numbers that are impossible.")
-      .def("push_height", &PySystem::push_height, "t"_a, "height"_a, "sigma"_a, "point"_a.none() = nb::none(),
-           nb::sig("def push_height(self, t: int, height: float, sigma: float, point: numpy.ndarray | None = None) -> None"),
-           "The same of a height above z = 0 of the building alone, m.")
-      .def(
-          "push_tag", &PySystem::push_tag, "t"_a, "id"_a, "position"_a, "orientation"_a, "covariance"_a,
-          "place"_a.none() = nb::none(), "place_orientation"_a.none() = nb::none(),
-          nb::sig("def push_tag(self, t: int, id: int, position: numpy.ndarray, orientation: numpy.ndarray, "
-                  "covariance: numpy.ndarray, place: numpy.ndarray | None = None, "
-                  "place_orientation: numpy.ndarray | None = None) -> None"),
-          "The same of a tag that a detector of yours saw: position (3,) in m and orientation (4,) w, x, y, z of the tag in B, "
-          "covariance (6, 6) of (position in B, rotation in the tag); where it hangs in the building, or None: then it is a landmark, "
-          "which says where the vehicle is when it is seen again, in this flight or in another. The tag's frame: origin in its "
-          "middle, x to the right and y upwards as a viewer of the upright tag sees it, z towards the viewer.")
       .def("finish", &PySystem::finish,
            "Processes all waiting events and ends; afterwards only results already waiting for poll() are left.")
       .def("poll", &PySystem::poll, "The Odometry of all images processed since the last call; empty with on_odometry.")
@@ -322,8 +328,9 @@ void bind_system(nb::module_& m) {
           [](PySystem& s, nb::handle type, nb::handle, nb::handle) {
             if (type.is_none()) s.finish();
           },
-          "type"_a.none(), "value"_a.none(), "traceback"_a.none())
-      .attr("__doc__") =
+          "type"_a.none(), "value"_a.none(), "traceback"_a.none());
+  bind_anchors(system);
+  system.attr("__doc__") =
       "Stereo visual-inertial odometry, fed by push_imu() and push_images() in order of time. One thread at a time may push. "
       "threaded: frontend, estimator and map run on threads of their own; same results. A callback is called with each Odometry "
       "(MapUpdate) on the thread that computed it; its exception is raised by a later push or finish(). In a `with`, "

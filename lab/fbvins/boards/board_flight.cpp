@@ -11,7 +11,7 @@
 #include "fbvins/calibration/simulated_board.hpp"
 #include "fbvins/calibration/target_file.hpp"
 #include "fbvins/core/angle.hpp"
-#include "fbvins/io/output_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 #include "fbvins/sim/imu_model.hpp"
 
@@ -87,13 +87,6 @@ std::string imu_truth(const SimulatedImu& imu) {
     return fmt::format("[{:.9f}]", fmt::join(transposed.data(), transposed.data() + 9, ", "));
   };
   return fmt::format("gyro_axes: {}\naccel_axes: {}\n", rows(imu.gyro_axes), rows(imu.accel_axes));
-}
-
-Result<void> write_whole(const std::string& path, const std::string& text) {
-  Result<OutputFile> file = OutputFile::create(path);
-  if (!file) return file.error();
-  file->write(text);
-  return file->close();
 }
 
 }  // namespace
@@ -178,8 +171,8 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
       fmt::format("lens: {}\ntime_offset_s: {}\nseed: {}\nexposure_ms: {}\nblur_px: {}\nnoise: {}\n", options.lens,
                   rig->time_offset_s, options.seed, options.exposure_ms, options.blur_px, options.noise) +
       imu_truth(readings);
-  if (Result<void> done = write_whole(folder + "/simulation.yaml", truth); !done) return done;
-  return write_whole(folder + "/target.yaml", target_to_yaml(options.board));
+  if (Result<void> done = write_file_atomically(folder + "/simulation.yaml", truth); !done) return done;
+  return write_file_atomically(folder + "/target.yaml", target_to_yaml(options.board));
 }
 
 }  // namespace fbvins

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/file_source.hpp"
-#include "fbvins/io/output_file.hpp"
 
 namespace fbvins {
 namespace {
@@ -25,13 +25,6 @@ std::uint64_t hash(std::string_view text, std::uint64_t h = 14695981039346656037
 std::string file_text(const std::string& path) {
   Result<std::string> text = read_file(path, std::uint64_t{1} << 30u);
   return text ? *std::move(text) : "";
-}
-
-Result<void> write_text(const std::string& path, const std::string& text) {
-  Result<OutputFile> file = OutputFile::create(path);
-  if (!file) return file.error();
-  file->write(text);
-  return file->close();
 }
 
 std::string last_line(const std::string& log) {
@@ -123,7 +116,7 @@ Result<bool> BenchFolder::finish(const BenchJob& job, int exit_code) {
   if (exit_code != 0 && (job.renders || exit_code != kNoPose || !fs::exists(job.part + "/summary.json"))) return false;
   const std::string note =
       job.renders ? job.made_of : nlohmann::ordered_json{{"fingerprint", job.made_of}, {"exit_code", exit_code}}.dump(2) + "\n";
-  if (Result<void> written = write_text(job.part + (job.renders ? "/rendered_by.txt" : "/cell.json"), note); !written)
+  if (Result<void> written = write_file_atomically(job.part + (job.renders ? "/rendered_by.txt" : "/cell.json"), note); !written)
     return written.error();
   std::error_code error;
   fs::remove_all(job.folder, error);

@@ -10,6 +10,7 @@
 #include <set>
 #include <thread>
 
+#include "fbvins/core/text.hpp"
 #include "fbvins/experiment/bench_runner.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/numbers.hpp"
@@ -89,14 +90,6 @@ CellResult read_cell(const Plan& plan, const Cell& cell, const std::string& out)
 }
 
 std::string value(double x) { return std::isfinite(x) ? fmt::format("{:.6g}", x) : ""; }
-
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> fields{""};
-  for (char c : line)
-    if (c == ',') fields.emplace_back();
-    else if (c != '\r') fields.back() += c;
-  return fields;
-}
 
 }  // namespace
 
@@ -183,7 +176,7 @@ Result<std::map<std::string, Reference>> read_reference(const std::string& path)
   std::map<std::string, std::size_t> column;
   for (std::size_t from = 0; from < text->size();) {
     const std::size_t end = std::min(text->find('\n', from), text->size());
-    const std::vector<std::string> fields = split(text->substr(from, end - from));
+    const std::vector<std::string> fields = split(trim(std::string_view(*text).substr(from, end - from)), ',');
     from = end + 1;
     if (column.empty()) {
       for (std::size_t i = 0; i < fields.size(); ++i) column[fields[i]] = i;

@@ -10,8 +10,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/flight/px4_frames.hpp"
-#include "fbvins/io/output_file.hpp"
 
 namespace fbvins {
 namespace {
@@ -69,10 +69,9 @@ const ArduPilotParameters& fixed_ardupilot_parameters() {
 }
 
 Result<void> write_parameters(const ArduPilotParameters& parameters, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path);
-  if (!file) return file.error();
-  for (const auto& [name, value] : parameters) file->write(fmt::format("{} {}\n", name, value));
-  return file->close();
+  std::string text;
+  for (const auto& [name, value] : parameters) text += fmt::format("{} {}\n", name, value);
+  return write_file_atomically(path, text);
 }
 
 }  // namespace

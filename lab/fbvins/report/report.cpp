@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fbvins/io/output_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/page/curves.hpp"
 #include "fbvins/page/page.hpp"
 #include "fbvins/report/flight_curves.hpp"
@@ -197,10 +197,7 @@ Result<std::vector<std::string>> write_report(const std::vector<std::string>& fo
   }
   ReportOptions options;
   options.title = title.empty() ? title_of(runs) : title;
-  Result<OutputFile> file = OutputFile::create(out);
-  if (!file) return file.error();
-  file->write(report_html(runs, nullptr, options));
-  if (Result<void> done = file->close(); !done) return done.error();
+  if (Result<void> done = write_file_atomically(out, report_html(runs, nullptr, options)); !done) return done.error();
   return warnings;
 }
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "fbvins/io/output_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 
 namespace fbvins {
 namespace {
@@ -42,10 +42,8 @@ Result<void> write_euroc(Simulation& simulation, const std::string& folder, cons
   Result<EurocFolder> recording = create_simulated_recording(folder, simulation.rig, options.depth);
   if (!recording) return recording.error();
   if (options.landmarks) {
-    Result<OutputFile> file = OutputFile::create((std::filesystem::path(folder) / "mav0/landmarks.csv").string());
-    if (!file) return file.error();
-    file->write(landmarks_csv(simulation));
-    if (Result<void> done = file->close(); !done) return done;
+    const std::string path = (std::filesystem::path(folder) / "mav0/landmarks.csv").string();
+    if (Result<void> done = write_file_atomically(path, landmarks_csv(simulation)); !done) return done;
   }
   int count = static_cast<int>(simulation.frames.size());
   if (options.max_frames > 0) count = std::min(count, options.max_frames);

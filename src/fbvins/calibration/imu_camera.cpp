@@ -39,8 +39,7 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   setup.corner_huber = kHuber_sigmas;
   fit.change(setup);
   if (!fit.solve() || !fit.judge()) return undetermined();
-  while (options.knot_spacing_s <= 0 && fit.worst_rms() > kRough &&
-         fit.problem().state().path.spacing_s() > 2 * kClosestKnots_s) {
+  while (fit.worst_rms() > kRough && fit.problem().state().path.spacing_s() > 2 * kClosestKnots_s) {
     ImuCameraFit closer = fit;
     closer.halve_spacing();
     if (!closer.solve() || !closer.judge() || closer.worst_rms() > kWorthwhile * fit.worst_rms()) break;

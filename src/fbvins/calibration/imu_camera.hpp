@@ -40,7 +40,6 @@ struct ImuCameraOptions {
       false;  ///< estimate a time offset of each camera; T_CnC0 are to be none then, or from images taken at once
   double gravity_mps2 = 9.81;
   double gravity_sigma_mps2 = 0.02;  ///< it differs by that much between places
-  double knot_spacing_s = 0;         ///< of the path's spline; 0: chosen by the readings' residuals
 };
 
 struct CameraOnImu {

@@ -280,7 +280,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   leave_out_alone(body, data.readings);
 
   const double rate_hz = rate_hz_of(input.imu);
-  const double spacing_s = options.knot_spacing_s > 0 ? options.knot_spacing_s : std::max(kDefaultSpacing_s, 2.0 / rate_hz);
+  const double spacing_s = std::max(kDefaultSpacing_s, 2.0 / rate_hz);
   CalibrationState state = first_state(first_path(body, data.readings, match->gyro_bias_radps, spacing_s, common->length_s()),
                                        spacing_s, *T_BC, *match, *offsets_s, data.readings);
   if (auto wrong = check_unit(state.gravity_T.norm())) return *wrong;

@@ -113,7 +113,6 @@ class ImuCameraProblem {
   const CalibrationSetup& setup() const { return setup_; }
   const CalibrationData& data() const { return data_; }
   CalibrationData& data() { return data_; }
-  CalibrationState take_state() && { return std::move(state_); }
   void change(const CalibrationSetup& setup);
   /// The board's size is as its file says.
   void fix_board_scale() { state_.board_scale = 1; }

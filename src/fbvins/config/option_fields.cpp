@@ -4,32 +4,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numeric>
+
+#include "fbvins/core/text.hpp"
 
 namespace fbvins {
 namespace {
 
 Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
-/// The whole text as a number; locale-free and exact, unlike streams.
-template <class T>
-bool parse(std::string_view text, T& value) {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size();
-}
-
 template <class T>
 Result<void> set_number(const OptionField& field, const std::string& text, T& target) {
-  T value{};
-  if (!parse(text, value) || !std::isfinite(static_cast<double>(value)))
+  const std::optional<T> value = number_in<T>(std::string_view(text).substr(text.starts_with('+') ? 1 : 0));
+  if (!value || !std::isfinite(static_cast<double>(*value)))
     return invalid(fmt::format("'{}' is not a {}", text, field.type_name()));
-  const auto number = static_cast<double>(value);
+  const auto number = static_cast<double>(*value);
   if (number < field.min || number > field.max)
     return invalid(fmt::format("{} is outside {}{}{}", text, field.range_text(), field.unit.empty() ? "" : " ", field.unit));
-  target = value;
+  target = *value;
   return {};
 }
 
@@ -39,17 +32,9 @@ Result<void> set_bool(const std::string& text, bool& target) {
   return {};
 }
 
-std::vector<std::string> names_in(const std::string& choices) {
-  std::vector<std::string> names(1);
-  for (const char c : choices)
-    if (c == '|') names.emplace_back();
-    else names.back() += c;
-  return names;
-}
-
 /// Which of the choices the text is.
 Result<std::size_t> choice(const OptionField& field, const std::string& text) {
-  const std::vector<std::string> names = names_in(field.choices);
+  const std::vector<std::string> names = split(field.choices, '|');
   const auto it = std::find(names.begin(), names.end(), text);
   if (it == names.end()) return invalid(fmt::format("'{}' is none of {}", text, field.choices));
   return static_cast<std::size_t>(it - names.begin());
@@ -105,7 +90,7 @@ std::string OptionField::value_text() const {
   if (auto* whole = std::get_if<int*>(&value)) return fmt::format("{}", **whole);
   if (auto* number = std::get_if<double*>(&value)) return fmt::format("{}", **number);
   if (auto* text = std::get_if<std::string*>(&value)) return **text;
-  if (auto* chosen = std::get_if<EnumValue>(&value)) return names_in(choices).at(chosen->get());
+  if (auto* chosen = std::get_if<EnumValue>(&value)) return split(choices, '|').at(chosen->get());
   return {};
 }
 

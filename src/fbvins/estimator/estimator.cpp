@@ -7,7 +7,6 @@
 
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/stage_timer.hpp"
-#include "fbvins/estimator/calibration_uncertainty.hpp"
 #include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
@@ -25,8 +24,8 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kTrouble_s = 2;
 /// Otherwise so many times what a good pose may owe is made up for at once.
 constexpr double kAtOnce = 2;
-/// Of a start with one camera; and the slowest motion that shows the scale.
-constexpr double kMaxScaleSigmaAtStart = 0.1, kShowsScale_mps = 0.2;
+/// Of a start with one camera.
+constexpr double kMaxScaleSigmaAtStart = 0.1;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
 constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
@@ -41,8 +40,8 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_(calibration_of(rig)),
       calibration_(calibrated_),
-      scale_sigma_(scale_sigma_of(rig)),
       one_camera_(!has_stereo(rig)),
+      uncertainty_(scale_sigma_of(rig), one_camera_, options.gravity_mps2),
       exposures_(rig),
       surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
@@ -145,7 +144,7 @@ void Estimator::open_window(const InitialSolution& start) {
   monitor_.restart();
   carried_.begin_window();
   frames_with_readings_ = kFramesAfterGap;
-  up_sigma_rad_ = scale_known_ = 0;
+  uncertainty_.restart();
 }
 
 /// From here on each observation knows when and from where it was seen (S1-S4).
@@ -185,7 +184,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   ImuSegment imu = frame.imu;
   imu.noise = reading_noise_.of(imu);
   Frame predicted = predict(frame, imu);
-  const std::vector<TrackedFeature> features = examine(frame, imu, predicted);
+  const std::vector<TrackedFeature> features = check_readings(frame, imu, predicted);
   out.imu_noise = imu.noise;
   predicted.standstill = standstill;
   if (surfaces_.has_sensor() && std::ssize(landmark_observations(window_, features, calibration_)) < kEnoughLandmarks)
@@ -207,7 +206,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
 
 /// Compares images and readings, and returns the features of the cameras that agree. Readings that the images
 /// contradict count less.
-std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
+std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
   wrong_cameras_ = 0;
   const Duration dt = frame.t - window_.newest().t;
   // After a gap the images have to say first how fast the vehicle is.
@@ -216,8 +215,8 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     monitor_.pass(dt);
     return frame.features;
   }
-  const Monitor::Verdict verdict = monitor_.examine(landmark_observations(window_, frame.features, calibration_), calibration_,
-                                                    predicted.state.T_FB, dt, predicted.state.v_B());
+  const Monitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
+                                                  predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
     imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);
@@ -266,53 +265,17 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   KnownLandmarks& known = window_.known();
   known.set_active_priors(newest.state.T_FB.p, solution.window.landmark_priors);
   covariance->topLeftCorner<6, 6>() = known.with_map_covariance(newest.state.T_FB, covariance->topLeftCorner<6, 6>());
-  const Mat15 level = window_.tilt().levelled_covariance(newest.state, *covariance);
-  out.pose_covariance = level.topLeftCorner<6, 6>();
-  out.velocity_covariance = level.block<3, 3>(nav::v, nav::v);
-  const NavState<W> level_state = window_.tilt().levelled(newest.state);
-  add_scale(level_state.T_FB.p - window_.tilt().pivot, scale_sigma_, out.pose_covariance.topLeftCorner<3, 3>());
-  add_scale(level_state.v_FB, scale_sigma_, out.velocity_covariance);
-  out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg) + axis_covariance(mean_rate_B(window_.frames()).norm());
-  out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_covariance(options_.gravity_mps2);
-  up_sigma_rad_ = up_sigma_rad(*covariance);
-  if (one_camera_ && level_state.v_FB.norm() > kShowsScale_mps)
-    scale_known_ = scale_sigma_of(level_state.v_FB, out.velocity_covariance);
-  out.scale_sigma = scale_known_;
+  uncertainty_.fill(*covariance, newest.state, window_.tilt(), mean_rate_B(window_.frames()), out);
 }
 
 void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
-  const KeyframeOptions& limits = options_.keyframes;
-  const auto keyframe_zone = [&] { return window_.frames().size() - limits.newest_frames; };
-  hand_on_keyframes(solution, keyframe_zone(), out.keyframes);
-  for (int i = keyframe_zone() - 1; i >= 1; --i)
-    if (!window_.frames()[i].keyframe) window_.drop_frame(i, calibration_);
-  while (keyframe_zone() > limits.max_keyframes) {
-    const int leaving = keyframe_policy_.leaving(window_, calibration_, keyframe_zone());
-    const Frame& host = window_.frames()[leaving];
-    const std::optional<Mat17> covariance = solution.covariance(host.id);
-    if (covariance) window_.known().set_host_uncertainty(host.state.T_FB, covariance->topLeftCorner<6, 6>());
-    window_.marginalise_keyframe(leaving, calibration_);
-  }
-  out.odometry.stats.frames_in_window = window_.frames().size();
-}
-
-void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out) {
-  for (int i = 0; i < keyframe_zone; ++i) {
-    const Frame& frame = window_.frames()[i];
-    if (!frame.keyframe || frame.id <= newest_handed_on_) continue;
-    newest_handed_on_ = frame.id;
-    Keyframe keyframe = keyframe_of(window_, i, calibration_);
-    keyframe.images = window_.take_images(i);
-    const std::optional<Mat17> covariance = solution.covariance(frame.id);
-    keyframe.gauge = gauge_state_of(window_, frame.state);
-    if (covariance) {
-      keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
-      keyframe.pose_covariance = window_.known().with_map_covariance(frame.state.T_FB, covariance->topLeftCorner<6, 6>());
-    }
-    keyframe.scale_sigma = scale_known_;
+  out.keyframes = keyframe_policy_.take_final(window_, solution, calibration_);
+  for (Keyframe& keyframe : out.keyframes) {
+    keyframe.scale_sigma = uncertainty_.scale_sigma();
     keyframe.reset_counter = reset_counter_;
-    out.push_back(std::move(keyframe));
   }
+  keyframe_policy_.shrink(window_, solution, calibration_);
+  out.odometry.stats.frames_in_window = window_.frames().size();
 }
 
 bool Estimator::contradicted_too_long(Time t) {
@@ -335,7 +298,8 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
 }
 
 void Estimator::compare_carried(const Odometry& solved) {
-  carried_.compare(window_, {solved, gravity_G(), up_sigma_rad_, reading_noise_.clipped(), monitor_.contradicted()});
+  carried_.compare(window_,
+                   {solved, gravity_G(), uncertainty_.up_sigma_rad(), reading_noise_.clipped(), monitor_.contradicted()});
 }
 
 /// The pose goes on, but nobody knows any more how it lies in the W of before: told by the reset counter.
@@ -392,7 +356,7 @@ void Estimator::publish(Odometry& out) {
   carried_.add_doubt(out);
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
-  out.gauge.up_sigma_rad = up_sigma_rad_;
+  out.gauge.up_sigma_rad = uncertainty_.up_sigma_rad();
   out.bias = level.bias;
   out.w_WB_B = last_rate_ - level.bias.gyro_radps;
 }

@@ -21,6 +21,7 @@
 #include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/estimator/state_uncertainty.hpp"
 #include "fbvins/estimator/surface_view.hpp"
 #include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/imu/reading_noise.hpp"
@@ -63,11 +64,10 @@ class Estimator {
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
   TrackedFrame refer_to_stamp(const TrackedFrame& frame) const;
   Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
-  std::vector<TrackedFeature> examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
+  std::vector<TrackedFeature> check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
   void fill_covariances(const WindowSolution& solution, Odometry& out);
   void shrink_window(const WindowSolution& solution, Estimate& out);
-  void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   bool contradicted_too_long(Time t);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
   bool start_is_good(const TrackedFrame& frame, const Odometry& solved) const;
@@ -82,8 +82,8 @@ class Estimator {
   EstimatorOptions options_;
   ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
-  double scale_sigma_;                    ///< standard deviation of the calibrated scale (W21)
   bool one_camera_;                       ///< the rig has one only
+  StateUncertainty uncertainty_;          ///< as of the last usable solve
   Exposures exposures_;
   SurfaceFinder surfaces_;
   TrackedFrame referred_;  ///< the newest frame, where not all of it was seen at its stamp
@@ -106,10 +106,7 @@ class Estimator {
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();
-  double up_sigma_rad_ = 0;  ///< as of the last usable solve
-  double scale_known_ = 0;   ///< with one camera: its relative standard deviation when the motion last showed it
   PublishedPose published_;
-  FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number
   std::optional<Pose<G, B>> restart_pose_;  ///< where the next G begins: at its first frame (position and heading)
 };

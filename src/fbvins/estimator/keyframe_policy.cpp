@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "fbvins/estimator/window_views.hpp"
 
@@ -31,6 +32,37 @@ int KeyframePolicy::leaving(const SlidingWindow& window, const Calibration& cali
   WindowProblem problem;
   window.fill_problem(calibration, problem);
   return least_informative_keyframe(problem, keyframes, solver_);
+}
+
+std::vector<Keyframe> KeyframePolicy::take_final(SlidingWindow& window, const WindowSolution& solution,
+                                                 const Calibration& calibration) {
+  std::vector<Keyframe> out;
+  for (int i = 0; i < zone(window); ++i) {
+    const Frame& frame = window.frames()[i];
+    if (!frame.keyframe || frame.id <= newest_final_) continue;
+    newest_final_ = frame.id;
+    Keyframe keyframe = keyframe_of(window, i, calibration);
+    keyframe.images = window.take_images(i);
+    keyframe.gauge = gauge_state_of(window, frame.state);
+    if (const std::optional<Mat17> covariance = solution.covariance(frame.id)) {
+      keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
+      keyframe.pose_covariance = window.known().with_map_covariance(frame.state.T_FB, covariance->topLeftCorner<6, 6>());
+    }
+    out.push_back(std::move(keyframe));
+  }
+  return out;
+}
+
+void KeyframePolicy::shrink(SlidingWindow& window, const WindowSolution& solution, const Calibration& calibration) {
+  for (int i = zone(window) - 1; i >= 1; --i)
+    if (!window.frames()[i].keyframe) window.drop_frame(i, calibration);
+  while (zone(window) > options_.max_keyframes) {
+    const int leaves = leaving(window, calibration, zone(window));
+    const Frame& host = window.frames()[leaves];
+    if (const std::optional<Mat17> covariance = solution.covariance(host.id))
+      window.known().set_host_uncertainty(host.state.T_FB, covariance->topLeftCorner<6, 6>());
+    window.marginalise_keyframe(leaves, calibration);
+  }
 }
 
 double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver& solver) {

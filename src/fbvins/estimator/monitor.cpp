@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/monitor.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "fbvins/core/angle.hpp"
 #include "fbvins/core/median.hpp"
+#include "fbvins/estimator/camera_residuals.hpp"
 
 namespace fbvins {
 namespace {
 
-/// Landmarks in an image without which it proves nothing, for a camera and for a pose.
-constexpr std::size_t kFewest = 15;
 /// Median residuals at the predicted pose, in standard deviations of a feature: up to 1 where all is well. More is expected
 /// after a longer time.
 constexpr double kUsual_sigma = 1.5, kUsualFor_s = 0.06;
@@ -46,97 +43,8 @@ constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
 /// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is.
 constexpr double kDark_s = 0.15;
 constexpr int kSettling = 5;
-/// A doubt that is told as a reset; two of them within a few seconds are no way to fly.
-constexpr double kReset_m = 0.1, kReset_rad = 3 * kDegree, kNextReset_s = 5;
-/// A doubt about the tilt has to be confirmed by gravity: by biases that are where they were, for this time.
-constexpr double kTilt_rad = 1 * kDegree, kConfirmed_s = 1.5, kAccelBack_mps2 = 0.1, kGyroBack_radps = 0.005;
-/// No bias moves so far in so short a time. On flights without a fault no estimated one does.
-constexpr double kJump_s = 2, kAccelJump_mps2 = 0.25, kGyroJump_radps = 0.005, kMoved_sigma = 5;
-/// At the beginning, when the first errors of the start are found, they do.
-constexpr double kBegun_s = 2;
-/// Nor is it another one after a restart that this has caused.
-constexpr double kRemembered_s = 30;
-
-/// A change of a bias in standard deviations, of which `floor` is the least. Of a consistent estimate the covariance of a change
-/// is what it gained or lost meanwhile.
-double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, double floor) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> gained(before - after);
-  const Vec3 along = gained.eigenvectors().transpose() * change;
-  return std::sqrt((along.array().square() / (gained.eigenvalues().array().abs() + floor * floor)).sum());
-}
-
-bool moved(const Monitor::Biases& from, const Monitor::Biases& to, double accel_mps2, double gyro_radps) {
-  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma) >
-             kMoved_sigma ||
-         change_sigma(to.bias.gyro_radps - from.bias.gyro_radps, from.gyro, to.gyro, gyro_radps / kMoved_sigma) > kMoved_sigma;
-}
-
-struct Medians {
-  std::array<std::optional<double>, kMostCameras> norm;  ///< of the residuals' norms; none with few landmarks
-  std::array<Vec2, kMostCameras> shift;                  ///< of the residuals themselves
-  double focal = 0;                                      ///< standard deviations for a radian
-
-  bool of(int camera) const { return norm[static_cast<std::size_t>(camera)].has_value(); }
-  double worst() const {
-    double worst = 0;
-    for (const std::optional<double>& n : norm) worst = std::max(worst, n.value_or(0));
-    return worst;
-  }
-};
-
-CameraPair pair_of(int camera, const std::vector<LandmarkObservation>& observations) {
-  for (const LandmarkObservation& l : observations)
-    if (l.feature->cameras.left == camera || l.feature->cameras.right == camera) return l.feature->cameras;
-  return {static_cast<std::int8_t>(camera), static_cast<std::int8_t>(camera)};
-}
-
-/// The camera that is off most, if the others are not, or else its pair, which sees the same things, if the others are not.
-/// `off(camera)`: by how much; `fits(others, this)`.
-template <class Off, class Fits>
-std::optional<CameraPair> suspects(const std::vector<LandmarkObservation>& observations, const Medians& at, int camera_count,
-                                   Off&& off, Fits&& fits) {
-  int worst = 0;
-  for (int c = 1; c < camera_count; ++c)
-    if (off(c) > off(worst)) worst = c;
-  if (!at.of(worst)) return std::nullopt;
-  const auto alone = static_cast<std::int8_t>(worst);
-  for (const CameraPair cameras : {CameraPair{alone, alone}, pair_of(worst, observations)}) {
-    double of_others = 0;
-    int others = 0;
-    for (int c = 0; c < camera_count; ++c) {
-      if (cameras.has(c)) continue;
-      others += at.of(c);
-      of_others = std::max(of_others, off(c));
-    }
-    if (others > 0 && fits(of_others, off(worst))) return cameras;
-  }
-  return std::nullopt;
-}
-
-Medians medians(const std::vector<LandmarkObservation>& observations, const CameraGeometry& cameras, int camera_count,
-                const Pose<G, B>& T_GB, const Vec3& v_B) {
-  const Mat3 R_BG = T_GB.R().transpose();
-  Medians out;
-  out.shift.fill(Vec2::Zero());
-  for (int c = 0; c < camera_count; ++c) {
-    std::vector<double> residuals, x, y;
-    for (const LandmarkObservation& l : observations) {
-      const auto [left, right] = l.feature->cameras;
-      if (c != left && c != right) continue;
-      const std::optional<Observation>& o = c == left ? l.feature->left : l.feature->right;
-      if (!o) continue;
-      const Vec3 p_C = cameras.R_CB[c] * (R_BG * (l.p_G - T_GB.p) - cameras.t_BC[c] - o->displacement_B(v_B));
-      const Vec2 r =
-          p_C.z() > kMinScaledDepth ? Vec2(o->sqrt_information * (p_C.head<2>() / p_C.z() - o->normalised)) : Vec2(1e3, 1e3);
-      residuals.push_back(r.norm()), x.push_back(r.x()), y.push_back(r.y());
-      out.focal = o->sqrt_information(0, 0);
-    }
-    if (residuals.size() < kFewest) continue;
-    out.norm[static_cast<std::size_t>(c)] = median(residuals);
-    out.shift[static_cast<std::size_t>(c)] = Vec2(median(x), median(y));
-  }
-  return out;
-}
+/// Two resets within a few seconds are no way to fly.
+constexpr double kNextReset_s = 5;
 
 Vec3 middle_of(const std::vector<LandmarkObservation>& observations) {
   Vec3 middle;
@@ -151,9 +59,10 @@ Vec3 middle_of(const std::vector<LandmarkObservation>& observations) {
 }  // namespace
 
 void Monitor::restart() {
-  const std::optional<Biases> refuted = refuted_;
+  TiltCheck tilt = std::move(tilt_);
   *this = Monitor(assumed_, calibrating_);
-  refuted_ = refuted;
+  tilt_ = std::move(tilt);
+  tilt_.restart();
 }
 
 void Monitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt) {
@@ -165,7 +74,7 @@ void Monitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt)
     return;
   }
   turning_noise_ = std::max(turning_noise_, off);
-  if (!may_be_away_) may_be_away_ = true, shifts_G_ += kTurnedAway_m * kTurnedAway_m * Mat3::Identity();
+  if (!may_be_away_) may_be_away_ = true, doubt_.add_position(kTurnedAway_m);
   if (off < kTurn_sigma && !turns_contradict_) return;
   if (!turns_contradict_) turns_contradict_ = turned_away_ = true;
   const Vec3 turn_G = dt.seconds() / turns.span.seconds() * turns.off_G;
@@ -189,7 +98,7 @@ void Monitor::blind(Duration dt) {
     if (blind_s_ > kDark_s) settling_ = kSettling;
     return;
   }
-  doubt_tilt();  // readings that are doubted have to carry alone
+  tilt_.doubt();  // readings that are doubted have to carry alone
   hopeless_ = hopeless_ || blind_s_ > kBlind_s;
 }
 
@@ -215,43 +124,12 @@ double Monitor::largest_drift() const {
   return largest;
 }
 
-void Monitor::doubt_tilt() {
-  if (biases_.empty()) tilt_doubted_ = true;
-  else doubt_tilt(biases_.front());
-}
+void Monitor::take(const BiasEstimate& biases) { hopeless_ = tilt_.take(biases, contradicted_) || hopeless_; }
 
-void Monitor::doubt_tilt(const Biases& before) {
-  if (tilt_doubted_) return;
-  tilt_doubted_ = true;
-  before_ = before;
-  confirmed_s_ = refuted_s_ = 0;
-}
-
-void Monitor::take(const Biases& now) {
-  if (!begun_) begun_ = now.t;
-  if ((now.t - *begun_).seconds() < kBegun_s && !refuted_) return;
-  const double dt_s = biases_.empty() ? 0 : (now.t - biases_.back().t).seconds();
-  biases_.push_back(now);
-  while ((now.t - biases_.front().t).seconds() > kJump_s) biases_.pop_front();
-  if (refuted_ && (now.t - refuted_->t).seconds() > kRemembered_s) refuted_.reset();
-  const Biases& from = refuted_ ? *refuted_ : biases_.front();
-  if (moved(from, now, kAccelJump_mps2, kGyroJump_radps)) doubt_tilt(from);
-  if (!tilt_doubted_ || contradicted_) return;
-  const bool away = before_ && moved(*before_, now, kAccelBack_mps2, kGyroBack_radps);
-  (away ? refuted_s_ : confirmed_s_) += dt_s;
-  (away ? confirmed_s_ : refuted_s_) = 0;
-  if (refuted_s_ > kConfirmed_s) hopeless_ = true, refuted_ = before_;
-  if (confirmed_s_ <= kConfirmed_s) return;
-  tilt_doubted_ = false;
-  tilt_G_.setZero();
-  before_.reset(), refuted_.reset();
-  biases_ = {now};
-}
-
-Monitor::Verdict Monitor::examine(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
-                                  const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
+Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
+                                const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
   Verdict out;
-  if (observations.size() < kFewest) {
+  if (observations.size() < kFewestLandmarks) {
     blind(dt);
     return out;
   }
@@ -263,9 +141,7 @@ Monitor::Verdict Monitor::examine(const std::vector<LandmarkObservation>& observ
   out.noise.gyro = turning_noise_;
   ahead_G_ = middle_of(observations) - predicted.p;
   const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
-  const CameraGeometry cameras(calibration);
-  const int camera_count = calibration.camera_count();
-  const Medians at_prediction = medians(observations, cameras, camera_count, predicted, v_B);
+  const ResidualMedians at_prediction = camera_residuals(observations, calibration, predicted, v_B);
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
@@ -274,13 +150,12 @@ Monitor::Verdict Monitor::examine(const std::vector<LandmarkObservation>& observ
     return out;
   }
   const PoseRefinement seen = refine_pose(observations, calibration, predicted, v_B);
-  const Medians at_seen = medians(observations, cameras, camera_count, seen.T_GB, v_B);
-  const auto off = [&](int camera) {
-    const auto c = static_cast<std::size_t>(camera);
-    return excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0);
-  };
-  const auto fits = [&](double others, double worst) { return others < (excess < 0 ? kOther * worst : patience * kUsual_sigma); };
-  const std::optional<CameraPair> wrong = suspects(observations, at_prediction, camera_count, off, fits);
+  const ResidualMedians at_seen = camera_residuals(observations, calibration, seen.T_GB, v_B);
+  std::vector<double> off;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(calibration.camera_count()); ++c)
+    off.push_back(excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0));
+  const std::optional<CameraPair> wrong = camera_off_alone(
+      observations, at_prediction, off, [&](double worst) { return excess < 0 ? kOther * worst : patience * kUsual_sigma; });
   if (excess < 0 && wrong && wrong->left != wrong->right) {
     pass(dt);  // something moves before one of several pairs
     return out;
@@ -342,18 +217,14 @@ void Monitor::follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Durati
 }
 
 void Monitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G) {
-  if (turn_G_.isZero(0)) where_G_ = predicted.p;
-  const Vec3 turn_G = predicted.q * turn_B;
-  turn_G_ += turn_G, shift_G_ += shift_G;
-  turns_G_ += turn_G * turn_G.transpose(), shifts_G_ += shift_G * shift_G.transpose();
-  tilt_G_ += Vec3(turn_G.x(), turn_G.y(), 0);
-  if (tilt_G_.norm() > kTilt_rad) doubt_tilt();
+  doubt_.add(predicted, turn_B, shift_G);
+  tilt_.add_turn(predicted.q * turn_B);
 }
 
 bool Monitor::take_reset() {
-  if (contradicted() || (shift_G_.norm() < kReset_m && turn_G_.norm() < kReset_rad && !turned_away_)) return false;
+  if (contradicted() || !(doubt_.large() || turned_away_)) return false;
   turned_away_ = may_be_away_ = false;
-  turn_G_.setZero(), shift_G_.setZero(), turns_G_.setZero(), shifts_G_.setZero();
+  doubt_.clear();
   count_reset();
   return true;
 }
@@ -362,17 +233,5 @@ void Monitor::count_reset() {
   hopeless_ = hopeless_ || since_reset_s_ < kNextReset_s;
   since_reset_s_ = 0;
 }
-
-Mat6 Monitor::doubt(const Pose<G, B>& T_GB) const {
-  const Mat3 R_BG = T_GB.R().transpose();
-  const Mat3 turns_G = turns();
-  const Mat3 lever = hat(T_GB.p - where_G_);
-  Mat6 out = Mat6::Zero();
-  out.topLeftCorner<3, 3>() = shifts_G_ + shift_G_ * shift_G_.transpose() + lever * turns_G * lever.transpose();
-  out.bottomRightCorner<3, 3>() = R_BG * turns_G * R_BG.transpose();
-  return out;
-}
-
-Mat3 Monitor::velocity_doubt(const Vec3& v_GB) const { return hat(v_GB) * turns() * hat(v_GB).transpose(); }
 
 }  // namespace fbvins

@@ -3,19 +3,19 @@
 // the images alone give. Where they contradict each other, the rest decides who is right, and the wrong
 // one counts less, or not at all (docs/derivations/integrity.md). It decides what a measurement is worth; the window estimates.
 //
-//   const Verdict verdict = monitor.examine(image_of(window, frame, calibration), predicted_pose, dt);
-//   if (verdict.contradiction) ...
-//   covariance += monitor.doubt(position);
+//   const Monitor::Verdict verdict = monitor.check(landmark_observations(window, features, calibration), calibration, predicted,
+//   dt); if (verdict.imu_contradicts) use(*verdict.seen); covariance += monitor.doubt(T_GB);
 //
 // One owner, one thread.
 #pragma once
 
 #include <array>
-#include <deque>
 #include <optional>
 #include <vector>
 
+#include "fbvins/estimator/accumulated_doubt.hpp"
 #include "fbvins/estimator/pose_refinement.hpp"
+#include "fbvins/estimator/tilt_check.hpp"
 #include "fbvins/estimator/window_turns.hpp"
 #include "fbvins/types/imu.hpp"
 
@@ -37,24 +37,19 @@ class Monitor {
   void restart();
   /// `observations`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before,
   /// with the velocity `v_B`, which counts where not all was seen at the stamp.
-  Verdict examine(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
-                  const Pose<G, B>& predicted, Duration dt, const Vec3& v_B = Vec3::Zero());
+  Verdict check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration, const Pose<G, B>& predicted,
+                Duration dt, const Vec3& v_B = Vec3::Zero());
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 
-  struct Biases {
-    Time t;
-    ImuBias bias;
-    Mat3 gyro = Mat3::Zero(), accel = Mat3::Zero();  ///< covariances
-  };
   /// After each solve: the biases are where a wrong tilt shows, and faults of the IMU that begin without a contradiction.
-  void take(const Biases& biases);
+  void take(const BiasEstimate& biases);
   /// And the turns of the window. `now`: its newest pose, `dt` after the one before.
   void take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt);
 
   /// A contradiction was seen within the last half second, or nothing explains the images, or gravity has not confirmed the
   /// attitude since.
-  bool contradicted() const { return contradicted_ || tilt_doubted_ || unexplained_; }
+  bool contradicted() const { return contradicted_ || tilt_.in_doubt() || unexplained_; }
   /// The images are right against the readings, as far as is known.
   bool follows_images() const { return contradicted_; }
   /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
@@ -62,15 +57,15 @@ class Monitor {
   /// W is a new one. A second time within a few seconds is hopeless.
   void count_reset();
   /// Gravity has to confirm the tilt.
-  void doubt_tilt();
+  void doubt_tilt() { tilt_.doubt(); }
   /// After darkness: the velocity is being found again.
   bool settling() const { return settling_ > 0; }
   /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
   bool hopeless() const { return hopeless_; }
   /// Covariance of (dp in G [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
-  Mat6 doubt(const Pose<G, B>& T_GB) const;
+  Mat6 doubt(const Pose<G, B>& T_GB) const { return doubt_.covariance(T_GB); }
   /// And of this velocity, in G.
-  Mat3 velocity_doubt(const Vec3& v_GB) const;
+  Mat3 velocity_doubt(const Vec3& v_GB) const { return doubt_.velocity_covariance(v_GB); }
 
  private:
   void blind(Duration dt);
@@ -86,8 +81,6 @@ class Monitor {
     zero.fill(Vec2::Zero());
     return zero;
   }
-  void doubt_tilt(const Biases& before);
-  Mat3 turns() const { return turns_G_ + turn_G_ * turn_G_.transpose(); }
   void take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G);
 
   ImuNoise assumed_;
@@ -102,21 +95,14 @@ class Monitor {
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
   double unexplained_s_ = 0;         ///< for how long images were in contradiction with everything, less those that agreed since
   bool unexplained_ = false;
-  bool contradicted_ = false, tilt_doubted_ = false, hopeless_ = false;
-  Vec3 turn_G_ = Vec3::Zero(), shift_G_ = Vec3::Zero();    ///< seen minus predicted, added up
-  Mat3 turns_G_ = Mat3::Zero(), shifts_G_ = Mat3::Zero();  ///< their squares, added up
-  Vec3 where_G_ = Vec3::Zero();                            ///< where the turn began
-  Vec3 ahead_G_ = Vec3::Zero();                            ///< from the pose to the middle of what is in view
-  double turning_noise_ = 1;                               ///< of the gyroscope, while the window turns in another way than it
-  bool turns_contradict_ = false;                          ///< and that is more than a suspicion
-  bool may_be_away_ = false, turned_away_ = false;         ///< the pose may have moved, and has, since the last reset
-  Vec3 tilt_G_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
-  int settling_ = 0;                                       ///< images after darkness that are not judged
-  std::optional<Time> begun_;
-  std::deque<Biases> biases_;               ///< of the last two seconds
-  std::optional<Biases> before_;            ///< the doubt about the tilt
-  std::optional<Biases> refuted_;           ///< those before a restart, which the ones after it refuted
-  double confirmed_s_ = 0, refuted_s_ = 0;  ///< for how long the biases have said so
+  bool contradicted_ = false, hopeless_ = false;
+  AccumulatedDoubt doubt_;  ///< since the last reset
+  TiltCheck tilt_;
+  Vec3 ahead_G_ = Vec3::Zero();                     ///< from the pose to the middle of what is in view
+  double turning_noise_ = 1;                        ///< of the gyroscope, while the window turns in another way than it
+  bool turns_contradict_ = false;                   ///< and that is more than a suspicion
+  bool may_be_away_ = false, turned_away_ = false;  ///< the pose may have moved, and has, since the last reset
+  int settling_ = 0;                                ///< images after darkness that are not judged
   double since_reset_s_ = 1e9;
 };
 

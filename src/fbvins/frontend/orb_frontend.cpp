@@ -39,7 +39,7 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       outliers_(rig.left, baseline_for_depths_m(rig), options.epipolar_px),
       starter_(rig.left, options.max_features, options.min_distance_px),
       depth_(rig, options, sigma_px_),
-      examination_(!options.follows_patches()) {}
+      detection_(!options.follows_patches()) {}
 
 TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& prior) {
   TrackedFrame out;
@@ -66,18 +66,18 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
   const ImageView left = packet.frame.left->view();
-  bool examined = true;
+  bool detected = true;
   if (images_.has_before()) {
-    examined = follow(left, stats);
+    detected = follow(left, stats);
   } else {
-    examine(left, stats);
+    detect(left, stats);
     recogniser_.recognise(tracks_, view_, images_.left(), stats);
   }
   cut_patches(tracks_, images_.left(), camera_);
   drop_ended();
-  if (examined) starter_.start(tracks_, view_, images_.left(), stats);
+  if (detected) starter_.start(tracks_, view_, images_.left(), stats);
   else stats.tracked = count_observed(tracks_);
-  examination_.pass(examined, stats.tracked + stats.detected);
+  detection_.pass(detected, stats.tracked + stats.detected);
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
   if (out.has_right) {
@@ -93,16 +93,16 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   return out;
 }
 
-/// Follows the tracks from the image before into this one (2.1.1, 2.2.3): prediction, alignment; in an image that is examined
-/// matching of the others; outlier checks. Returns whether the image was examined.
+/// Follows the tracks from the image before into this one (2.1.1, 2.2.3): prediction, alignment; in an image of which keypoints
+/// are detected matching of the others; outlier checks. Returns whether they were.
 bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   const CameraMotion motion = predictor_.between(images_.t_before(), view_.t);
   predict(tracks_, camera_, motion, depth_.typical_inverse_depth());
   drop_ended();
   locator_.follow(tracks_, view_, images_, stats);
-  const bool examined = examination_.due(count_observed(tracks_));
-  if (examined) {
-    examine(left, stats);
+  const bool detected = detection_.due(count_observed(tracks_));
+  if (detected) {
+    detect(left, stats);
     const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, stats);
     locator_.locate(tracks_, view_, images_, found, stats);
     recogniser_.recognise(tracks_, view_, images_.left(), stats);
@@ -110,16 +110,16 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   CpuTimer timer;
   outliers_.judge(tracks_, view_, predictor_, stats);
   drop_ended();
-  if (examined) matcher_.count_inliers(tracks_, stats);
+  if (detected) matcher_.count_inliers(tracks_, stats);
   thin_out(tracks_, most_, options_.min_distance_px);
   forget(tracks_, view_.t, options_.memory_s);
   drop_ended();
   stats.geometry_ms = timer.lap_ms();
-  return examined;
+  return detected;
 }
 
 /// Extracts and describes keypoints of the left image (2.2.1, 2.2.2).
-void OrbFrontend::examine(const ImageView& left, FrontendStats& stats) {
+void OrbFrontend::detect(const ImageView& left, FrontendStats& stats) {
   CpuTimer timer;
   stats.boost_ms += describer_.describe(left, view_, camera_.mask().get());
   stats.detect_ms += timer.lap_ms();

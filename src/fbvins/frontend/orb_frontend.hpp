@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `orb` frontend (paper 2.1.1, 2.2.1, 2.2.3): ORB features, followed from image to image and into the right image by patch
-// alignment from their predicted positions, and checked by epipolar RANSAC. Some images are examined: keypoints are
-// extracted, described and matched by Hamming distance, which finds tracks that alignment lost, re-observes landmarks and
-// starts tracks where there are few. A track that is not observed for a moment (blur, occlusion, a black image) is kept with
+// alignment from their predicted positions, and checked by epipolar RANSAC. In some images keypoints are extracted, described
+// and matched by Hamming distance, which finds tracks that alignment lost, re-observes landmarks and starts tracks where there
+// are few. A track that is not observed for a moment (blur, occlusion, a black image) is kept with
 // its descriptor and patch, and continues under its old id when it is observed again; so does, however much later, one whose
 // landmark the estimator has located.
 // Synchronous; one instance is used by one thread at a time; allocates only while it grows.
@@ -13,10 +13,10 @@
 
 #include <memory>
 
+#include "fbvins/frontend/detection_policy.hpp"
 #include "fbvins/frontend/handover.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/orb_depth.hpp"
-#include "fbvins/frontend/orb_examination.hpp"
 #include "fbvins/frontend/orb_locator.hpp"
 #include "fbvins/frontend/orb_options.hpp"
 #include "fbvins/frontend/orb_outlier_check.hpp"
@@ -49,7 +49,7 @@ class OrbFrontend final : public LeadingFrontend {
  private:
   double longest_gap_s() const;
   bool follow(const ImageView& left, FrontendStats& stats);
-  void examine(const ImageView& left, FrontendStats& stats);
+  void detect(const ImageView& left, FrontendStats& stats);
   void drop_ended();
   bool resume(const HandedTrack& handed, const Pyramid& image);
 
@@ -70,7 +70,7 @@ class OrbFrontend final : public LeadingFrontend {
   OrbOutlierCheck outliers_;
   OrbStarter starter_;
   OrbDepth depth_;
-  ExaminationPolicy examination_;
+  DetectionPolicy detection_;
   LandmarkUpdates updates_;
 };
 

@@ -102,7 +102,7 @@ TEST(OrbFrontend, ObservationsAreConsistent) {
   }
 }
 
-TEST(OrbFrontend, ExaminesOneImageInFourOrAllOfThem) {
+TEST(OrbFrontend, DetectsInOneImageInFourOrAllOfThem) {
   for (const bool all : {false, true}) {
     OrbFrontendOptions options = small_options();
     options.examine_all = all;

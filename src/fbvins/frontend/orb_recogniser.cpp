@@ -39,7 +39,9 @@ void OrbRecogniser::clear(OrbTracks& tracks) {
 }
 
 void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now) {
-  if (!options_.enabled || !view.T_GC || !track.seen_from_G || !track.inverse_depth || track.age_frames < kFewestFramesOfALandmark) return;
+  if (!options_.enabled || !view.T_GC || !track.seen_from_G || !track.inverse_depth ||
+      track.age_frames < kFewestFramesOfALandmark)
+    return;
   RememberedLandmark landmark;
   landmark.track = track.id;
   landmark.descriptor = track.descriptor;

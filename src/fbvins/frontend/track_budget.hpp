@@ -15,8 +15,8 @@ namespace fbvins {
 
 class TrackBudget {
  public:
-  /// `alone`: what a rig of one group follows, which is the most that one of several may. Two groups follow a third more, three or
-  /// more twice as many.
+  /// `alone`: what a rig of one group follows, which is the most that one of several may. Two groups follow a third more, three
+  /// or more twice as many.
   TrackBudget(int alone, std::size_t groups)
       : alone_(alone),
         rig_(static_cast<int>(groups) > 1 ? 2 * alone * std::min(static_cast<int>(groups), 3) / 3 : alone),

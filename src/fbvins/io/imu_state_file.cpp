@@ -6,9 +6,9 @@
 #include <charconv>
 #include <filesystem>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/calibration_fields.hpp"
-#include "fbvins/io/output_file.hpp"
 
 namespace fbvins {
 namespace {
@@ -104,10 +104,7 @@ std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
 }
 
 Result<void> write_imu_state(const std::string& path, const ImuState& state, const ImuNoise& imu) {
-  auto file = OutputFile::create(path);
-  if (!file) return file.error();
-  file->write(imu_state_to_yaml(state, imu));
-  return file->close();
+  return write_file_atomically(path, imu_state_to_yaml(state, imu));
 }
 
 }  // namespace fbvins

@@ -13,9 +13,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <utility>
+
+#include "fbvins/core/text.hpp"
 
 namespace fbvins {
 namespace {
@@ -39,21 +40,8 @@ constexpr std::array<Baud, 12> kBauds = {{{9600, B9600},
                                           {3000000, B3000000},
                                           {4000000, B4000000}}};
 
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == ':') parts.emplace_back();
-    else parts.back() += c;
-  }
-  return parts;
-}
-
 /// -1 where the text is not a whole number.
-long number(const std::string& text) {
-  long value = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() ? value : -1;
-}
+long number(const std::string& text) { return number_in<long>(text).value_or(-1); }
 
 Error bad_address(const std::string& text, const std::string& why) {
   return {ErrorCode::invalid_argument, fmt::format("'{}' is no MAVLink address: {}", text, why)};
@@ -131,7 +119,7 @@ constexpr int kMostPackets = 64;
 }  // namespace
 
 Result<LinkAddress> parse_link_address(const std::string& text, std::uint16_t default_own_port) {
-  const std::vector<std::string> parts = split(text);
+  const std::vector<std::string> parts = split(text, ':');
   if (parts[0] == "udp") return parse_udp(text, parts, default_own_port);
   if (parts[0] == "serial") return parse_serial(text, parts);
   return bad_address(text, "it begins with udp: or serial:");

@@ -10,7 +10,6 @@
 
 #include <functional>
 #include <mutex>
-#include <string>
 #include <vector>
 
 #include "fbvins/live/frozen_camera.hpp"

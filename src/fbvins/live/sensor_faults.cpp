@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 #include <utility>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/core/text.hpp"
 
 namespace fbvins {
 namespace {
@@ -123,21 +123,6 @@ std::string known_names() {
   return out;
 }
 
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts(1);
-  for (const char c : text)
-    if (c == ':') parts.emplace_back();
-    else parts.back() += c;
-  return parts;
-}
-
-std::optional<double> number(const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 }  // namespace
 
 std::span<const FaultName> fault_names() { return kNames; }
@@ -146,15 +131,15 @@ Result<SensorFault> parse_fault(const std::string& text) {
   const auto refuse = [&](const std::string& why) {
     return Error{ErrorCode::invalid_argument, fmt::format("fault '{}': {}; it is KIND:START:LENGTH[:AMOUNT]", text, why)};
   };
-  const std::vector<std::string> parts = split(text);
+  const std::vector<std::string> parts = split(text, ':');
   const std::optional<FaultName> name = name_of(parts[0]);
   if (!name) return refuse(fmt::format("there are {}", known_names()));
   const bool has_amount = !name->unit.empty();
   if (parts.size() != (has_amount ? 4u : 3u))
     return refuse(has_amount ? fmt::format("{} has an AMOUNT ({})", parts[0], name->unit)
                              : fmt::format("{} has no AMOUNT", parts[0]));
-  const std::optional<double> start = number(parts[1]), length = number(parts[2]);
-  const std::optional<double> amount = has_amount ? number(parts[3]) : 0.0;
+  const std::optional<double> start = number_in<double>(parts[1]), length = number_in<double>(parts[2]);
+  const std::optional<double> amount = has_amount ? number_in<double>(parts[3]) : 0.0;
   if (!start || !length || !amount || *start < 0 || *length <= 0) return refuse("times are numbers, START >= 0, LENGTH > 0");
   if (std::abs(*amount) > name->most) return refuse(fmt::format("AMOUNT is at most {}", name->most));
   if (has_amount && !name->both_signs && *amount <= 0) return refuse("AMOUNT is more than 0");

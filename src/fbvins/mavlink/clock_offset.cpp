@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "fbvins/core/median.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -50,9 +52,7 @@ void ClockOffset::add(Time asked, Time theirs, Time answered) {
 Duration ClockOffset::round_trip() const {
   std::vector<std::int64_t> all;
   for (const Answer& answer : answers_) all.push_back(answer.round_trip.ns);
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return {*middle};
+  return {median(all)};
 }
 
 }  // namespace fbvins

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/mavlink/vehicle_frames.hpp"
 
-#include <numbers>
-
 #include "fbvins/types/motion_at.hpp"
 
 namespace fbvins {

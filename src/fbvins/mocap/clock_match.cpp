@@ -152,8 +152,7 @@ Result<ClockMatch> match_clocks(const MarkerTrack& track, const Trajectory<W>& e
   const auto centre = static_cast<std::ptrdiff_t>(std::llround((around - offset_of(fine_a, fine_b, 0)).seconds() / kFineStep_s));
   const auto reach = static_cast<std::ptrdiff_t>(std::ceil(2 * coarse_s / kFineStep_s));
   const Peak fine = search(fine_a, fine_b, centre - reach, centre + reach, shortest_s);
-  return ClockMatch{offset_of(fine_a, fine_b, static_cast<double>(fine.shift)), fine.best.correlation,
-                    fine.best.count * kFineStep_s};
+  return ClockMatch{offset_of(fine_a, fine_b, static_cast<double>(fine.shift)), fine.best.correlation};
 }
 
 }  // namespace fbvins

@@ -12,7 +12,6 @@ namespace fbvins {
 struct ClockMatch {
   Duration offset;         ///< estimate's time = motion capture's time + offset, to some milliseconds
   double correlation = 0;  ///< of the two angular speeds there
-  double overlap_s = 0;
 };
 
 /// Any offset is found at which the two have `kShortestOverlap_s` in common. An error where no offset stands out.

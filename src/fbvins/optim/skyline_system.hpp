@@ -23,7 +23,6 @@ class SkylineSystem {
   void set_zero();
   /// H(index, index) += local, b(index) += local_b. The indices differ from one another; `local` is symmetric.
   void add(const std::vector<int>& index, const Eigen::MatrixXd& local, const Eigen::VectorXd& local_b);
-  void add_diagonal(int index, double value) { H_[at(index, index)] += value; }
 
   const Eigen::VectorXd& b() const { return b_; }
   Eigen::VectorXd diagonal() const;

@@ -59,7 +59,7 @@ TEST(SkylineSystem, SaysWhenNothingDeterminesAnUnknown) {
   Both both = chain_with_border();
   EXPECT_TRUE(both.skyline.factorise());
   both.skyline.set_zero();
-  for (int i = 0; i + 1 < both.skyline.size(); ++i) both.skyline.add_diagonal(i, 1);
+  for (int i = 0; i + 1 < both.skyline.size(); ++i) both.skyline.add({i}, Eigen::MatrixXd::Ones(1, 1), Eigen::VectorXd::Zero(1));
   EXPECT_FALSE(both.skyline.factorise());
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fbvins/camera/camera_times.hpp"
+#include "fbvins/core/text.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/source_rig.hpp"
 
@@ -17,15 +18,6 @@ namespace {
 
 constexpr Duration kTryAgainAfter{500'000'000};
 constexpr int kLongestWait_ms = 100;
-
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == ',') parts.emplace_back();
-    else parts.back() += c;
-  }
-  return parts;
-}
 
 /// Images side by side are of one size.
 Result<void> check_sizes(const V4l2Devices& devices, const StereoRig& rig) {
@@ -41,7 +33,7 @@ Result<void> check_sizes(const V4l2Devices& devices, const StereoRig& rig) {
 }  // namespace
 
 Result<V4l2Devices> parse_v4l2_devices(const std::string& text) {
-  std::vector<std::string> parts = split(text);
+  std::vector<std::string> parts = split(text, ',');
   const bool filled = std::none_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
   if (!filled || parts.size() < 2 || parts.size() > 1 + std::size_t{kMostCameras})
     return Error{

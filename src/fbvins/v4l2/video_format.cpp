@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cstring>
-#include <string_view>
 
 #include "fbvins/io/image_decode.hpp"
 
