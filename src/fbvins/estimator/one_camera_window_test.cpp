@@ -11,6 +11,9 @@
 namespace fbvins {
 namespace one_camera_window_test {
 
+/// Frames of the window that are not the newest.
+constexpr int kOld = test::kFrames - 2;
+
 /// What camera 0 sees of the test's window, without anything else that shows a scale.
 WindowProblem one_camera_window(bool with_readings) {
   WindowProblem p = test::make_window(false).problem;
@@ -77,11 +80,17 @@ TEST(OneCameraWindow, AWrongScaleIsLeftInAFewSteps) {
   }
 }
 
-/// The window after its first frame has left with the landmarks that it hosts.
+/// The window after its first frame has left with landmarks as the frames before the newest two see them: those are not in the
+/// prior.
 WindowProblem without_first_frame(const WindowProblem& p, MarginalisationMemory& memory) {
   std::vector<LeavingLandmark> leaving;
-  for (int k = 0; k < static_cast<int>(p.landmarks.size()); ++k)
-    if (p.landmarks[k].host == 0 || k % 2 == 0) leaving.push_back({k, p.landmarks[k].observation_count, false});
+  for (int k = 0; k < static_cast<int>(p.landmarks.size()); ++k) {
+    const WindowLandmark& l = p.landmarks[k];
+    if (l.host >= kOld || (l.host > 0 && k % 2 == 1)) continue;
+    int observations = 0;
+    while (observations < l.observation_count && p.observations[l.first_observation + observations].frame < kOld) ++observations;
+    leaving.push_back({k, observations, false});
+  }
   WindowProblem out = p;
   out.prior = marginalise_frame(p, 0, leaving, memory).prior;
   for (std::size_t i = leaving.size(); i-- > 0;) out.landmarks.erase(out.landmarks.begin() + leaving[i].index);
@@ -99,7 +108,7 @@ WindowProblem without_first_frame(const WindowProblem& p, MarginalisationMemory&
   return out;
 }
 
-/// Of the prior, along a change of the scale: what the relative standard deviation would be.
+/// Of the prior, along a change of the scale: one over the square of its relative standard deviation.
 double information_on_scale(const WindowProblem& p, const WindowPrior& prior) {
   Eigen::VectorXd n = Eigen::VectorXd::Zero(prior.quadratic.size());
   for (std::size_t k = 0; k < prior.frames.size(); ++k)
