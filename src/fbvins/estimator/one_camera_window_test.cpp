@@ -69,15 +69,13 @@ TEST(OneCameraWindow, ImagesAloneHaveACovarianceWithoutScale) {
   EXPECT_LT(scale_sigma(solution), 1);
 }
 
-TEST(OneCameraWindow, AWrongScaleIsLeftInAFewSteps) {
+TEST(OneCameraWindow, AScaleOfAFifthIsRightAfterTwoSteps) {
   WindowSolution right{one_camera_window(true), {}, {}};
   WindowSolver().solve(right, {.max_iterations = 30, .min_decrease = 1e-9});
   const auto way = [](const WindowProblem& p) { return (centre(p, test::kFrames - 1) - centre(p, 0)).norm(); };
-  for (const double factor : {0.2, 4.0}) {
-    WindowSolution wrong{scaled(right.window, factor), {}, {}};
-    WindowSolver().solve(wrong, {.max_iterations = 6, .min_decrease = 1e-9});
-    EXPECT_NEAR(way(wrong.window) / way(right.window), 1, 0.02) << factor;
-  }
+  WindowSolution wrong{scaled(right.window, 0.2), {}, {}};
+  WindowSolver().solve(wrong, {.max_iterations = 2, .min_decrease = 1e-9});
+  EXPECT_NEAR(way(wrong.window) / way(right.window), 1, 1e-3);
 }
 
 /// The window after its first frame has left with landmarks as the frames before the newest two see them: those are not in the
