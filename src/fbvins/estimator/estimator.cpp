@@ -25,7 +25,7 @@ constexpr double kTrouble_s = 2;
 /// Otherwise so many times what a good pose may owe is made up for at once.
 constexpr double kAtOnce = 2;
 /// Of a start with one camera.
-constexpr double kMaxScaleSigmaAtStart = 0.1;
+constexpr double kMaxScaleSigmaAtStart = 0.15;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
 constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
@@ -49,7 +49,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
       reading_noise_(imu_noise_),
       monitor_(imu_noise_, weights_of(options_).calibrating()),
-      window_(options_, weights_of(options)),
+      window_(options_, weights_of(options, !one_camera_)),
       published_(options.max_step_m, options.max_pending_m) {}
 
 StatePrior Estimator::prior() const {

@@ -10,8 +10,9 @@
 
 namespace fbvins {
 
-WindowWeights weights_of(const EstimatorOptions& o) {
+WindowWeights weights_of(const EstimatorOptions& o, bool images_show_scale) {
   WindowWeights w;
+  w.images_show_scale = images_show_scale;
   w.gravity_mps2 = o.gravity_mps2;
   w.estimate_tilt = o.up == UpDirection::state;
   w.estimate_extrinsics = o.estimate_extrinsics;

@@ -10,7 +10,8 @@
 
 namespace fbvins {
 
-WindowWeights weights_of(const EstimatorOptions& options);
+/// `images_show_scale`: not with one camera.
+WindowWeights weights_of(const EstimatorOptions& options, bool images_show_scale = true);
 
 /// Where no two cameras see the same things, remembered landmarks would hold the scale at what it was thought to be when they
 /// left the window. The place of a camera that only stands for a depth sensor is none to be refined.

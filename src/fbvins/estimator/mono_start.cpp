@@ -327,7 +327,7 @@ std::optional<std::vector<NavState<G>>> start_with_one_camera(std::span<const Tr
     if (in_front < 0.5) return std::nullopt;
   }
   const double rms = std::sqrt(std::max(0.0, solved.cost) / std::max(1, problem.rows));
-  if (in_front < kInFront || rms > kMaxRms_sigma || solved.x.tail<3>().norm() > limits.max_accel_bias_mps2) return std::nullopt;
+  if (in_front < kInFront || rms > kMaxRms_sigma) return std::nullopt;
   if (parallax(motion, T_BC.p, solved.x, depths) < kLeastParallax) return std::nullopt;
   const Vec3 v_last = solved.x.head<3>() + motion.back().t_s * solved.x.segment<3>(3) + motion.back().v;
   const double speed = std::max(solved.x.head<3>().norm(), v_last.norm());

@@ -13,7 +13,9 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
   out.tilt = problem.tilt;
   out.calibration = problem.calibration;
   out.weights = problem.weights;
-  out.weights.at_first_estimates = true;
+  // With one camera the scale may still change by a tenth: first estimates of different scales would be taken for a motion
+  // that shows it.
+  out.weights.at_first_estimates = problem.weights.images_show_scale;
   out.prior = problem.prior;
   out.landmarks.clear();
   out.observations.clear();

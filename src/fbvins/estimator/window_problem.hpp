@@ -37,6 +37,7 @@ struct WindowWeights {
   double gravity_mps2 = 9.81;
   double standstill_velocity_sigma_mps = 0.01;
   double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
+  bool images_show_scale = true;         ///< false: of one camera, which shows everything else
   bool at_first_estimates = false;       ///< Jacobians of frames in the prior are taken at their first estimates
   bool estimate_tilt = true;             ///< false: G is level
   bool estimate_extrinsics = false;

@@ -13,6 +13,20 @@ constexpr double kNegligibleLambda = 1e-12;
 /// right before the lens, and the step of all variables would be refused. Changes no minimum and enters no prior.
 constexpr double kDepthDamping = 1.0;
 
+/// Of a step that shrinks everything, the largest share that is made as one.
+constexpr double kMostShrinking = 0.5;
+
+/// By which share a step makes all depths longer (W10b).
+double common_scale(const WindowProblem& window, const std::vector<PointBlock>& points, const std::vector<Vec3>& steps) {
+  double along = 0, all = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double rho = window.landmarks[i].alpha_beta_rho.z(), information = points[i].V(2, 2);
+    along -= information * rho * steps[i].z();
+    all += information * rho * rho;
+  }
+  return all > 0 ? std::max(along / all, -kMostShrinking) : 0;
+}
+
 /// The variables of a window, without its measurements.
 struct Estimate {
   std::vector<NavState<G>> states;
@@ -36,7 +50,7 @@ struct Estimate {
   }
 };
 
-void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step) {
+void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step, double scale) {
   const Eigen::VectorXd& d = step.dense;
   if (at.tilt_size > 0) window.tilt.angle_rad += d.segment<kTiltSize>(at.tilt_row());
   for (int i = 0; i < window.frame_count(); ++i) {
@@ -46,7 +60,8 @@ void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step)
   }
   for (std::size_t i = 0; i < window.landmarks.size(); ++i) {
     Vec3& l = window.landmarks[i].alpha_beta_rho;
-    l += step.landmarks[i];
+    l.head<2>() += step.landmarks[i].head<2>();
+    l.z() = (l.z() + step.landmarks[i].z() + scale * l.z()) / (1 + scale);
     l.z() = std::max(l.z(), window.weights.min_inverse_depth_1pm);
   }
   if (at.calibration_size > 0) {
@@ -83,6 +98,11 @@ std::optional<Mat17> WindowSolution::covariance(FrameId frame) const {
   return index < 0 ? std::nullopt : information.covariance(index);
 }
 
+double WindowSolver::linearise(const WindowProblem& window) {
+  images_show_scale_ = window.weights.images_show_scale;
+  return fbvins::linearise(window, pairs_, equations_);
+}
+
 bool WindowSolver::step(double lambda, WindowInformation& information) {
   information.clear();
   if (reduced_.H.rows() != equations_.H.rows()) reduced_.H.setZero(equations_.H.rows(), equations_.H.cols());
@@ -90,7 +110,7 @@ bool WindowSolver::step(double lambda, WindowInformation& information) {
   reduced_.g = equations_.g;
   reduced_.H.diagonal() *= 1.0 + lambda;
   reduced_.H.diagonal().array() += kRegularisation;
-  const double depth_damping = lambda > 0 ? kDepthDamping : 0.0;
+  const ThirdDamping depth_damping{lambda > 0 ? kDepthDamping : 0.0, !images_show_scale_};
   if (!equations_.points.eliminate(lambda, reduced_.H, reduced_.g, depth_damping)) return false;
   if (!information.factorise(equations_.layout, reduced_.H)) return false;
   step_.dense = -information.solve(reduced_.g);
@@ -102,7 +122,7 @@ bool WindowSolver::step(double lambda, WindowInformation& information) {
   for (std::size_t i = 0; i < step_.landmarks.size(); ++i) {
     const PointBlock& point = equations_.points.points()[i];
     const Vec3& d = step_.landmarks[i];
-    twice += lambda * d.cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(d) + depth_damping * d.z() * d.z();
+    twice += lambda * d.cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(d) + depth_damping.of(point) * d.z() * d.z();
   }
   step_.predicted_decrease = 0.5 * twice;
   step_.size = step_.dense.tail(6 * equations_.layout.frames).lpNorm<Eigen::Infinity>();
@@ -125,7 +145,9 @@ struct WindowSolver::Descent {
   double step_size() const { return solver.step_.size; }
   double apply_step() {
     before.save(solution.window);
-    move(solution.window, solver.equations_.layout, solver.step_);
+    const std::vector<PointBlock>& points = solver.equations_.points.points();
+    const double scale = solver.images_show_scale_ ? 0 : common_scale(solution.window, points, solver.step_.landmarks);
+    move(solution.window, solver.equations_.layout, solver.step_, scale);
     return cost_of(solution.window, solver.pairs_);
   }
   void undo_step() { before.restore(solution.window); }

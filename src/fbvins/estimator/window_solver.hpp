@@ -56,7 +56,7 @@ class WindowSolver {
   void solve(WindowSolution& solution, const LmOptions& options);
 
   /// The parts of solve(): linearises at the window's estimate; then a damped step from there, and its factor.
-  double linearise(const WindowProblem& window) { return fbvins::linearise(window, pairs_, equations_); }
+  double linearise(const WindowProblem& window);
   bool step(double lambda, WindowInformation& information);
   const WindowStep& step() const { return step_; }
   const NormalEquations& equations() const { return equations_; }
@@ -68,6 +68,7 @@ class WindowSolver {
   NormalEquations equations_;
   ReducedEquations reduced_;
   WindowStep step_;
+  bool images_show_scale_ = true;  ///< of the window that was linearised
 };
 
 }  // namespace fbvins

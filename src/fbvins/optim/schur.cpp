@@ -48,11 +48,11 @@ PointBlock& PointBlocks::add(std::span<const int> offsets) {
   return points_.back();
 }
 
-bool PointBlocks::eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, double third_damping) {
+bool PointBlocks::eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, const ThirdDamping& third) {
   for (PointBlock& point : points_) {
     Eigen::Matrix3d V = point.V;
     V.diagonal() *= 1.0 + lambda;
-    V(2, 2) += third_damping;
+    V(2, 2) += third.of(point);
     bool invertible = false;
     double determinant = 0;
     const double scale = V(0, 0) * V(1, 1) * V(2, 2);

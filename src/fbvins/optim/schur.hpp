@@ -21,6 +21,14 @@ struct PointBlock {
   int count = 0;              ///< number of blocks
 };
 
+/// What is added to the third diagonal element of a point's block.
+struct ThirdDamping {
+  double most = 0;
+  bool fades = false;  ///< where the block has much more information of its own
+
+  double of(const PointBlock& point) const { return fades && most > 0 ? most * most / (most + point.V(2, 2)) : most; }
+};
+
 /// Storage for all points of a problem; cleared and refilled without giving memory back.
 class PointBlocks {
  public:
@@ -39,9 +47,9 @@ class PointBlocks {
   }
 
   /// Subtracts every point from the lower triangle of H (column-major) and from g.
-  /// V is damped by lambda times its diagonal, its third element by `third_damping` as well. False if some V is not
+  /// V is damped by lambda times its diagonal, its third element by `third` as well. False if some V is not
   /// positive definite.
-  bool eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, double third_damping = 0);
+  bool eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, const ThirdDamping& third = {});
   /// The step of each point for a step of the dense system: dx = -V^-1 (w + sum W_k^T dx_k), with the V^-1 that
   /// eliminate() damped.
   void back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const;
