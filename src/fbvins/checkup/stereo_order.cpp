@@ -5,6 +5,7 @@
 
 #include "fbvins/features/klt.hpp"
 #include "fbvins/features/shi_tomasi.hpp"
+#include "fbvins/frontend/either_camera.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
 
@@ -32,16 +33,8 @@ int matches(KltStereoMatcher& matcher, const Camera& camera, const Pyramid& left
 
 bool StereoOrder::swapped() const { return as_swapped >= kFewestMatches && as_swapped > kTimesMore * as_named; }
 
-StereoRig swapped_rig(const StereoRig& rig) {
-  StereoRig other = rig;
-  std::swap(other.left, other.right);
-  other.T_BC0 = rig.T_BC1.cast_frames<B, C0>();
-  other.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
-  return other;
-}
-
 StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> frames) {
-  const StereoRig other = swapped_rig(rig);
+  const StereoRig other = mirrored(rig);
   KltStereoMatcher as_named(rig, kNearest_m), as_swapped(other, kNearest_m);
   ShiTomasiDetector detector(kDistance_px);
   Pyramid left, right;

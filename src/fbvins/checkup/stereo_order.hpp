@@ -24,9 +24,6 @@ struct StereoOrder {
 
 StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> frames);
 
-/// The rig with its cameras exchanged.
-StereoRig swapped_rig(const StereoRig& rig);
-
 std::optional<Finding> check_stereo_order(const StereoOrder& order);
 
 }  // namespace fbvins

@@ -6,9 +6,9 @@
 #include <algorithm>
 
 #include "fbvins/camera/check_rig.hpp"
-#include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/doctor/refine_corrected.hpp"
+#include "fbvins/frontend/either_camera.hpp"
 
 namespace fbvins {
 namespace {
@@ -37,7 +37,7 @@ std::string kinds_of(const std::vector<Finding>& findings) {
 }
 
 /// Of the images as they are named.
-StereoRig as_named(const Diagnosis& diagnosis) { return diagnosis.swapped ? swapped_rig(diagnosis.rig) : diagnosis.rig; }
+StereoRig as_named(const Diagnosis& diagnosis) { return diagnosis.swapped ? mirrored(diagnosis.rig) : diagnosis.rig; }
 
 Error no(std::string why) { return {ErrorCode::malformed, std::move(why)}; }
 
