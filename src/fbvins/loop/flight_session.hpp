@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "fbvins/loop/flight_scale.hpp"
@@ -68,11 +69,17 @@ class FlightSession {
   }
   void restart_readings() { readings_.restart(); }
 
-  bool localised = false;  ///< at the last keyframe
-  bool confirmed = false;  ///< a place was where it is expected to be since the flight was found in an older map
+  /// Whether it is localised in the map now. Returns whether it was just found in an older one.
+  bool note_localised(bool now) {
+    const bool before = std::exchange(localised_, now);
+    return now && !before && !began_map_;
+  }
+  /// Whether a place was where it is expected to be since the flight was found in an older map.
+  bool confirmed() const { return confirmed_; }
+  void confirm() { confirmed_ = true; }
 
  private:
-  bool begun_ = false, began_map_ = false;
+  bool begun_ = false, began_map_ = false, localised_ = false, confirmed_ = false;
   std::uint32_t number_ = 0, reset_counter_ = 0;
   std::optional<GaugeState> gauge_;
   double path_m_ = 0;

@@ -48,6 +48,15 @@ TEST(FlightSession, IsLevelByWhatItWasToldLast) {
   EXPECT_EQ(session.q_LG().coeffs(), so3_exp(Vec3(0.01, 0, 0)).coeffs());
 }
 
+TEST(FlightSession, IsFoundInAnOlderMapEachTimeThatItBecomesLocalised) {
+  FlightSession older(at(0, 0), 1, false, {}, 1), first(at(0, 0), 0, true, {}, 1);
+  EXPECT_TRUE(older.note_localised(true));
+  EXPECT_FALSE(older.note_localised(true));
+  EXPECT_FALSE(older.note_localised(false));
+  EXPECT_TRUE(older.note_localised(true));
+  EXPECT_FALSE(first.note_localised(true)) << "it began the map";
+}
+
 TEST(FlightSession, OnlyOneCameraInAnotherFlightsMapNeedsAScale) {
   Keyframe k = at(0, 0);
   k.scale_sigma = 0.02;

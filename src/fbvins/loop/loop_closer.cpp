@@ -142,8 +142,7 @@ void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   update.localised = frame_.known();
   update.map_session = session_.number();
   update.anchored = map_.anchored;
-  update.found = update.localised && !session_.localised && !session_.began_map();
-  session_.localised = update.localised;
+  update.found = session_.note_localised(update.localised);
   if (!update.localised) return;
   update.T_MG = frame_.T_MG();
   update.T_MW = update.T_MG * keyframe.T_WG.inverse();
@@ -223,7 +222,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
     MapKeyframe& k = *map_.find(proposal.candidate);
     const MeasuredPose seen = measured_pose(k, proposal.edge, metres_with(k));
     if (take(k, seen)) {
-      session_.confirmed = true;
+      session_.confirm();
     } else if (!find_again(query, proposal, seen)) {
       ++update.stats.refused;
       join_.note_refused(session_.number(), 1);
@@ -239,7 +238,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
 /// The first places that a flight of one camera recognises have depths of a poor scale, and so has where they put it. Until a
 /// place confirms that, others may find it anew.
 bool LoopCloser::find_again(MapKeyframe& query, const Proposal& proposal, const MeasuredPose& seen) {
-  if (session_.confirmed || !session_.needs_scale()) return false;
+  if (session_.confirmed() || !session_.needs_scale()) return false;
   const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG(), seen.T_MB, proposal.verified);
   if (T_MG) found_at(*T_MG, seen);
   return T_MG.has_value();
