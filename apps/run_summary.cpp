@@ -20,6 +20,7 @@ void count_health(const RunRecord& record, RunSummary& summary) {
   std::uint32_t reset_counter = 0;
   for (const Odometry& o : record.odometry) {
     ++counts[label_of(o.health)];
+    for (const int camera : cameras_in(o.health.without_cameras)) ++summary.without_cameras[camera];
     if (had_pose && o.reset_counter != reset_counter) ++summary.restarts;
     reset_counter = o.reset_counter;
     had_pose = had_pose || o.health.has_pose();
@@ -224,6 +225,7 @@ std::string to_text(const RunSummary& s) {
   text += to_line(s.coverage);
   text += fmt::format("restarts {}, frames by health:", s.restarts);
   for (const auto& [name, frames] : s.health) text += fmt::format(" {} {}", name, frames);
+  for (const auto& [camera, frames] : s.without_cameras) text += fmt::format(", {} without camera {}", frames, camera);
   text += s.images_bad > 0 ? fmt::format("\n{} image files could not be used\n", s.images_bad) : "\n";
   text += s.evaluation ? to_table(*s.evaluation, Alignment::se3) : fmt::format("no accuracy: {}\n", s.no_evaluation);
   if (s.nees && s.nees->count > 0)

@@ -3,6 +3,7 @@
 // to run; `timing` is not.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -29,6 +30,7 @@ struct RunSummary {
   Coverage coverage;
   int restarts = 0;                                 ///< times the estimator started anew after its first pose
   std::vector<std::pair<std::string, int>> health;  ///< frames per "state" or "state/reason"
+  std::map<int, int> without_cameras;               ///< frames in which a camera was not used, by its number
   std::optional<Evaluation> evaluation;             ///< where the recording holds ground truth
   std::string no_evaluation;                        ///< why there is none
   std::optional<NeesSummary> nees;                  ///< after alignment of position and heading in the first second

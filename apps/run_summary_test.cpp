@@ -55,6 +55,13 @@ TEST(RunSummary, CountsRestartsOnlyAfterTheFirstPose) {
   EXPECT_EQ(s.no_evaluation, "the recording holds no ground truth");
 }
 
+TEST(RunSummary, NamesTheCamerasThatWereNotUsed) {
+  RunRecord record = circle(10);
+  for (int k = 4; k < 10; ++k) record.odometry[static_cast<std::size_t>(k)].health.without_cameras = k < 7 ? 0b1 : 0b101;
+  const std::string text = to_text(summarise(record, images(10), {}));
+  EXPECT_NE(text.find("good 10, 6 without camera 0, 3 without camera 2\n"), std::string::npos) << text;
+}
+
 TEST(RunSummary, AgainstItsOwnTruthThereIsNoError) {
   const RunRecord record = circle(200);
   const RunSummary s = summarise(record, images(220), record.poses());

@@ -338,6 +338,9 @@ void LoopCloser::optimise(MapUpdate& update) {
 
 PoseGraphReport LoopCloser::finish() {
   level_by_newest();
+  const bool localised =
+      std::ranges::any_of(map_.keyframes(), [&](const MapKeyframe& k) { return k.placed && join_.is_of_flight(k.session); });
+  if (!localised) return {};  // the older map stays as it was
   const PoseGraphReport report = optimise_graph();
   upkeep();
   return report;

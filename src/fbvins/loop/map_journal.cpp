@@ -122,9 +122,10 @@ MapRest rest_beyond(const PlaceMap& map, const MapBase& base) {
 struct Blocks {
   std::map<std::uint64_t, std::uint32_t> places;
   std::string state;
+  std::optional<std::uint64_t> damaged_at;  ///< a block is all there and yet not what was written
 };
 
-/// Up to the first block that is not whole.
+/// Up to the first block that is not whole: a program that is killed leaves a part of its last one.
 Blocks blocks_of(const ByteSource& journal) {
   Blocks blocks;
   std::string head, payload;
@@ -133,7 +134,12 @@ Blocks blocks_of(const ByteSource& journal) {
     if (head.size() < kBlockHeadBytes) return blocks;
     const auto block = BytesIn(head).get<BlockHead>();
     journal.fill(payload, at + kBlockHeadBytes, block.bytes);
-    if (payload.size() < block.bytes || block.checksum != block_checksum(at, block.kind, payload)) return blocks;
+    if (payload.size() < block.bytes) return blocks;
+    if (block.checksum != block_checksum(at, block.kind, payload)) {
+      const bool unwritten = std::ranges::all_of(head, [](char c) { return c == 0; });  // of a disk without power
+      if (!unwritten) blocks.damaged_at = at;
+      return blocks;
+    }
     if (block.kind == kPlaceBlock) blocks.places.emplace(at + kBlockHeadBytes, block.bytes);
     if (block.kind == kStateBlock) blocks.state = payload;
     at += kBlockHeadBytes + block.bytes;
@@ -257,17 +263,22 @@ void MapJournal::begin_anew() {
 
 Result<PlaceMap> with_journal(PlaceMap map, const ByteSource& journal, const std::string& name) {
   const std::string header = journal.read(0, kHeaderBytes);
-  if (header.size() < kHeaderBytes || !header.starts_with(kJournalName)) return map;
+  if (header.size() < kHeaderBytes || !header.starts_with(kJournalName)) return damaged_map(name, "not a journal");
   BytesIn in(std::string_view(header).substr(kJournalName.size()));
   const auto version = in.get<std::uint32_t>();
   (void)in.get<std::uint32_t>();
   const auto identity = in.get<std::uint64_t>();
-  if (in.get<std::uint64_t>() != map_checksum(std::string_view(header).substr(0, kHeaderBytes - 8))) return map;
+  if (in.get<std::uint64_t>() != map_checksum(std::string_view(header).substr(0, kHeaderBytes - 8)))
+    return damaged_map(name, "the checksum of its header differs");
   if (version != kJournalVersion)
     return Error{ErrorCode::unsupported,
                  fmt::format("{}: journal of version {}, this program reads {}", name, version, kJournalVersion)};
   if (!map.base || map.base->identity != identity) return map;
   const Blocks blocks = blocks_of(journal);
+  if (blocks.damaged_at)
+    return damaged_map(name,
+                       fmt::format("a checksum differs at byte {}; without this file the map is as it was before the flight",
+                                   *blocks.damaged_at));
   if (blocks.state.empty()) return map;
   BytesIn state(blocks.state);
   if (Result<void> applied = apply(state, journal, blocks, map); !applied) return applied.error();

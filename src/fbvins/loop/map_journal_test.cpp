@@ -22,6 +22,8 @@
 namespace fbvins {
 namespace map_journal_test {
 
+constexpr std::size_t kHeaderBytes = 32;
+
 using namespace test_room;
 namespace fs = std::filesystem;
 
@@ -157,9 +159,27 @@ TEST_F(Journal, CutAnywhereItGivesTheNewestWholeState) {
     const std::size_t cut =
         std::min(whole.size(), i % 2 == 0 ? rng.below(static_cast<std::uint32_t>(whole.size())) : near + rng.below(60) - 30);
     write_file(journal_, whole.substr(0, cut));
+    if (cut < kHeaderBytes) {
+      EXPECT_FALSE(open_map(path_, 0).ok()) << "the header is written in one piece";
+      continue;
+    }
     const auto newest = std::ranges::find_if(states.rbegin(), states.rend(), [&](const auto& s) { return s.first <= cut; });
     ASSERT_TRUE(on_disk() == newest->second) << cut;
   }
+}
+
+TEST_F(Journal, ABlockThatIsNotWhatWasWrittenIsAnErrorAndTheFileStays) {
+  save_a_flown_map();
+  KeptFlight flight(path_, *open_map(path_, 100'000));
+  flight.fly(15, 7.3, 9);
+  ASSERT_GT(flight.keep(), 0u);
+  std::string bytes = bytes_at(journal_);
+  bytes[bytes.size() / 2] ^= 1;
+  write_file(journal_, bytes);
+  const auto map = open_map(path_, 0);
+  ASSERT_FALSE(map.ok());
+  EXPECT_NE(map.error().message.find("a checksum differs at byte"), std::string::npos) << map.error().message;
+  EXPECT_EQ(bytes_at(journal_), bytes);
 }
 
 TEST_F(Journal, DamagedItGivesAnEarlierStateOrAnErrorWithASentence) {
