@@ -25,8 +25,8 @@ constexpr Duration kImuLeadIn = {1'000'000'000};
 
 Result<std::string> find_root(const FileSource& files, const std::string& path) {
   std::vector<std::string> roots;
-  for (const char* file : {"cam0/data.csv", "cam1/data.csv", "cam0/sensor.yaml"})  // the last: its CSV is what is missing
-    if (roots.empty()) roots = files.folders_holding(file);
+  for (int i = 0; i < kMostCameras && roots.empty(); ++i) roots = files.folders_holding(fmt::format("cam{}/data.csv", i));
+  if (roots.empty()) roots = files.folders_holding("cam0/sensor.yaml");  // its CSV is what is missing
   if (roots.empty()) {
     std::error_code ignored;
     const bool bag = std::filesystem::exists(path + "/metadata.yaml", ignored);
@@ -89,6 +89,11 @@ class EurocReader {
       if (i < 2 ? images || calibration : images && (calibration || options_.brings_rig())) cameras_.push_back(i);
     }
     if (cameras_.empty()) cameras_ = {0};
+    std::string renumbered;
+    for (std::size_t i = 0; i < cameras_.size(); ++i)
+      if (cameras_.size() > 1 && cameras_[i] != static_cast<int>(i))
+        renumbered += fmt::format(", cam{} is camera {}", cameras_[i], i);
+    if (!renumbered.empty()) warn(fmt::format("cameras are numbered as they come{}", renumbered));
     // Two cameras see depths themselves: depth images are for one.
     const bool wanted = options_.camera == "depth" || (options_.camera == "all" && cameras_.size() == 1);
     has_depth_ = wanted && cameras_.front() == 0 && exists(depth("data.csv")) && exists(depth("sensor.yaml"));

@@ -84,6 +84,22 @@ TEST(EurocFolder, KeepsFourCameras) {
   EXPECT_FALSE(frames[1].image(3));
 }
 
+TEST(EurocFolder, AnyOfTheCamerasIsARecordingAndANewNumberIsSaid) {
+  const StereoRig rig = four_camera_rig();
+  const std::string folder = four_cameras("euroc_any", rig, 3);
+  std::filesystem::remove_all(folder + "/mav0/cam1");
+  const auto three = open_dataset(folder);
+  ASSERT_TRUE(three) << three.error().message;
+  EXPECT_EQ((*three)->rig().camera_count(), 3);
+  EXPECT_EQ((*three)->info().warnings.at(0), "cameras are numbered as they come, cam2 is camera 1, cam3 is camera 2");
+  std::filesystem::remove_all(folder + "/mav0/cam0");
+  std::filesystem::remove_all(folder + "/mav0/cam3");
+  const auto one = open_dataset(folder);
+  ASSERT_TRUE(one) << one.error().message;
+  EXPECT_EQ((*one)->rig().camera_count(), 1);
+  EXPECT_TRUE((*one)->rig().T_BC0.p.isApprox(rig.T_BC(2).p, 1e-12));
+}
+
 TEST(EurocFolder, OfFourCamerasTheFirstTwoCanBeUsed) {
   DatasetOptions options;
   options.camera = "both";
