@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "fbvins/core/options.hpp"
+#include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc.hpp"
 #include "fbvins/io/frame_prefetcher.hpp"
 #include "fbvins/io/image_check.hpp"
@@ -71,7 +72,9 @@ Result<DatasetContents> contents_of(const std::string& path, const DatasetOption
 Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
     : contents_(with_cameras(std::move(contents), options.camera)),
       prefetcher_(std::make_unique<FramePrefetcher>(contents_.frames, *contents_.loader, options.prefetch_frames)),
-      deliver_rest_(options.max_frames == 0 && options.duration_s == 0) {}
+      deliver_rest_(options.max_frames == 0 && options.duration_s == 0) {
+  warn_of_silent_cameras(contents_);
+}
 
 Dataset::~Dataset() = default;
 

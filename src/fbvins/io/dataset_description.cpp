@@ -73,4 +73,23 @@ void describe(DatasetContents& contents) {
   describe_imu(contents.imu, info);
 }
 
+void warn_of_silent_cameras(DatasetContents& contents) {
+  constexpr double kSilent_s = 1;
+  const std::vector<FrameEntry>& frames = contents.frames;
+  for (int camera = 0; camera < contents.rig.camera_count() && contents.rig.camera_count() > 1 && !frames.empty(); ++camera) {
+    Duration longest;
+    Time last = frames.front().t, from = last;
+    const auto up_to = [&](Time t) {
+      if (t - last > longest) longest = t - last, from = last;
+      last = t;
+    };
+    for (const FrameEntry& frame : frames)
+      if (!frame.file(camera).empty()) up_to(frame.t);
+    up_to(frames.back().t);
+    if (longest.seconds() >= kSilent_s)
+      contents.info.warnings.push_back(fmt::format("camera {}: no images for {:.1f} s, from {:.1f} s after the first frame on",
+                                                   camera, longest.seconds(), (from - frames.front().t).seconds()));
+  }
+}
+
 }  // namespace fbvins

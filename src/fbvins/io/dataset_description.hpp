@@ -9,6 +9,9 @@ namespace fbvins {
 /// Fills in the fields of `contents.info` on frames and IMU samples, with a warning for each long gap. Needs a frame.
 void describe(DatasetContents& contents);
 
+/// With a warning for each of several cameras whose images stay away for a second or more while another's come.
+void warn_of_silent_cameras(DatasetContents& contents);
+
 /// Keeps the frames that the options ask for; an error where there is none.
 Result<void> cut_frames(const DatasetOptions& options, std::vector<FrameEntry>& frames);
 

@@ -84,6 +84,29 @@ TEST(EurocFolder, KeepsFourCameras) {
   EXPECT_FALSE(frames[1].image(3));
 }
 
+TEST(EurocFolder, ACameraWhoseImagesStayAwayIsNamed) {
+  const std::string folder = empty_folder("euroc_silent");
+  auto recording = EurocFolder::create(folder, four_camera_rig(), "made by hand");
+  ASSERT_TRUE(recording.ok());
+  for (int i = 0; i < 40; ++i) {
+    const Time t{1'000'000'000 + i * 50'000'000LL};
+    StereoFrame frame{t, i < 15 ? pattern(0) : nullptr, pattern(1), {pattern(2), i % 4 == 0 ? pattern(3) : nullptr}};
+    ASSERT_TRUE(recording->add(frame, t).ok());
+  }
+  std::vector<ImuSample> readings;
+  for (int i = 0; i < 400; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000LL}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  ASSERT_TRUE(recording->finish(readings, {}).ok());
+  const auto named = [&](const char* camera) {
+    DatasetOptions options;
+    options.camera = camera;
+    const std::vector<std::string> warnings = (*open_dataset(folder, options))->info().warnings;
+    return std::ranges::count(warnings, "camera 0: no images for 1.2 s, from 0.7 s after the first frame on");
+  };
+  EXPECT_EQ(named("all"), 1);
+  EXPECT_EQ(named("both"), 1);
+  EXPECT_EQ(named("right"), 0);
+}
+
 TEST(EurocFolder, AnyOfTheCamerasIsARecordingAndANewNumberIsSaid) {
   const StereoRig rig = four_camera_rig();
   const std::string folder = four_cameras("euroc_any", rig, 3);
