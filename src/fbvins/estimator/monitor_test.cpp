@@ -336,9 +336,9 @@ TEST(Monitor, DoubtedReadingsMayNotCarryAlone) {
   (void)monitor.check(scene.seen(turned(0.05)), scene.calibration, {}, kStep);
   for (int k = 0; k < 10; ++k) (void)monitor.check(dark.seen({}), dark.calibration, {}, kStep);
   EXPECT_TRUE(monitor.hopeless());
-  Monitor believed(assumed(), false);
-  for (int k = 0; k < 10; ++k) (void)believed.check(dark.seen({}), dark.calibration, {}, kStep);
-  EXPECT_FALSE(believed.hopeless());
+  Monitor trusted(assumed(), false);
+  for (int k = 0; k < 10; ++k) (void)trusted.check(dark.seen({}), dark.calibration, {}, kStep);
+  EXPECT_FALSE(trusted.hopeless());
 }
 
 }  // namespace monitor_test

@@ -76,7 +76,9 @@ void describe(DatasetContents& contents) {
 void warn_of_silent_cameras(DatasetContents& contents) {
   constexpr double kSilent_s = 1;
   const std::vector<FrameEntry>& frames = contents.frames;
-  for (int camera = 0; camera < contents.rig.camera_count() && contents.rig.camera_count() > 1 && !frames.empty(); ++camera) {
+  const int cameras = contents.rig.camera_count();
+  if (cameras < 2 || frames.empty()) return;
+  for (int camera = 0; camera < cameras; ++camera) {
     Duration longest;
     Time last = frames.front().t, from = last;
     const auto up_to = [&](Time t) {
