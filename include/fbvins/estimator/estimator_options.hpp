@@ -2,6 +2,8 @@
 // Options of the estimator, with defaults and units.
 #pragma once
 
+#include <cmath>
+
 #include "fbvins/core/options.hpp"
 #include "fbvins/types/imu.hpp"
 
@@ -67,13 +69,17 @@ struct EstimatorOptions {
   int max_iterations = 4;
   int max_landmarks = 300;
   double gravity_mps2 = 9.81;
-  double gyro_noise_scale = 2.5;
-  double accel_noise_scale = 24.0;
+  double gyro_noise_scale = 1;
+  double accel_noise_scale = 1;
+  double gyro_unmodelled_radps_rthz = 3.5e-4;  ///< what axes and scale leave, in addition to the calibrated noise; set by tests
+  double accel_unmodelled_mps2_rthz = 0.005;    ///< likewise
   double gyro_walk_scale = 5.0;   ///< factors on the calibrated random walks of the biases; set by tests
   double accel_walk_scale = 0.4;  ///< likewise
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
   bool estimate_line_delay = false;
+  bool align_time_offset = true;
+  double max_start_scale_sigma = 0.15;
   double max_blind_m = 0.5;
   double max_imu_gap_s = 1.0;
   int min_tracks = 10;
@@ -81,10 +87,12 @@ struct EstimatorOptions {
   double max_step_m = 0.0015;
   double max_pending_m = 0.1;
 
-  /// The noise that readings are weighted with, from the calibrated one.
+  /// The noise that readings are weighted with where nothing vibrates (ReadingNoise adds that), from the calibrated one.
   ImuNoise assumed(ImuNoise noise) const {
-    noise.gyro_noise_density_radps_rthz *= gyro_noise_scale;
-    noise.accel_noise_density_mps2_rthz *= accel_noise_scale;
+    noise.gyro_noise_density_radps_rthz =
+        std::hypot(gyro_noise_scale * noise.gyro_noise_density_radps_rthz, gyro_unmodelled_radps_rthz);
+    noise.accel_noise_density_mps2_rthz =
+        std::hypot(accel_noise_scale * noise.accel_noise_density_mps2_rthz, accel_unmodelled_mps2_rthz);
     noise.gyro_random_walk_radps2_rthz *= gyro_walk_scale;
     noise.accel_random_walk_mps3_rthz *= accel_walk_scale;
     return noise;
@@ -101,9 +109,13 @@ struct EstimatorOptions {
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);
     v("gyro_noise_scale", gyro_noise_scale, "", "factor on the calibrated gyroscope noise density", 0.1, 100.0);
-    v("accel_noise_scale", accel_noise_scale, "", "factor on the calibrated accelerometer noise density (vibration)", 0.1, 100.0);
+    v("accel_noise_scale", accel_noise_scale, "", "factor on the calibrated accelerometer noise density", 0.1, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
+    v("align_time_offset", align_time_offset, "",
+      "find a time offset between images and IMU that the calibration does not know, up to 0.1 s, by gyroscope and tracks");
+    v("max_start_scale_sigma", max_start_scale_sigma, "",
+      "one camera: the largest relative standard deviation of the scale of a pose called good soon after the start", 0.01, 1.0);
     v("estimate_line_delay", estimate_line_delay, "", "refine the line delay of a rolling shutter while flying");
     v("max_blind_m", max_blind_m, "m",
       "largest standard deviation that flight by the IMU alone, without usable images, may add to the position", 0.01, 100.0);

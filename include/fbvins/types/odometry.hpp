@@ -102,6 +102,7 @@ struct Odometry {
   double tilt_sigma_rad = 0;                  ///< standard deviation of the attitude's tilt about its less certain axis
   bool level = false;                         ///< tilt_sigma_rad is below kLevelSigma_rad
   double scale_sigma = 0;  ///< one camera: relative standard deviation of the scale; 0 with a pair or before a pose
+  double time_offset_s = 0;  ///< t_imu = t_image + the rig's offset + this, as found so far (docs/derivations/gyro_alignment.md)
   Health health;
   std::uint32_t reset_counter =
       0;  ///< +1 whenever W is a new frame: after a restart, or a correction too large to be made slowly

@@ -125,6 +125,7 @@ struct StatePrior {
   ImuBias bias;
   Vec3 gravity_G = Vec3(0, 0, -9.81);  ///< m/s^2
   bool valid = false;
+  Duration time_offset = {};  ///< what the rig's is corrected by; also before the first start
 };
 
 }  // namespace fbvins

@@ -42,6 +42,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibration_(calibrated_),
       one_camera_(!has_stereo(rig)),
       uncertainty_(scale_sigma_of(rig), one_camera_, options.gravity_mps2),
+      time_alignment_(rig, options.align_time_offset),
       exposures_(rig),
       surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
@@ -54,9 +55,10 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
 
 StatePrior Estimator::prior() const {
   StatePrior out;
+  out.time_offset = time_alignment_.correction();
   if (!running_) return out;
   const Frame& newest = window_.newest();
-  return {newest.t, newest.state.T_FB, newest.state.v_FB, newest.state.bias, gravity_G(), true};
+  return {newest.t, newest.state.T_FB, newest.state.v_FB, newest.state.bias, gravity_G(), true, out.time_offset};
 }
 
 WindowSnapshot Estimator::snapshot() const { return snapshot_of(window_, calibration_); }
@@ -66,6 +68,8 @@ Vec3 Estimator::gravity_G() const { return window_.tilt().gravity_G(options_.gra
 Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
   const TrackedFrame& whole = contract_.enforced(tracked);
+  if (time_alignment_.add(whole, running_) && !running_) initialiser_.reset();
+  exposures_.correct_line_delay(time_alignment_.line_delay_correction_s());
   const bool as_it_is = exposures_.at_stamp(whole) && !options_.estimate_line_delay;
   if (!as_it_is) referred_ = refer_to_stamp(whole);
   const TrackedFrame& frame = as_it_is ? whole : referred_;
@@ -77,6 +81,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   Odometry& odometry = out.odometry;
   odometry.id = frame.id;
   odometry.t = frame.t;
+  odometry.time_offset_s = time_alignment_.correction().seconds();
   if (running_) publish(odometry);
   odometry.reset_counter = reset_counter_;
   if (running_) carried_.remember(window_, odometry, reading_noise_.clipped());
@@ -88,9 +93,11 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
 
 void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& out) {
   CpuTimer timer;
-  const std::optional<InitialSolution> start = initialiser_.process(frame, rest, calibration_, restart_pose_);
+  TrackedFrame weighted = frame;
+  weighted.imu.noise = reading_noise_.of(frame.imu);
+  const std::optional<InitialSolution> start = initialiser_.process(weighted, rest, calibration_, restart_pose_);
   out.odometry.stats.prepare_ms = timer.lap_ms();
-  if (!start) {
+  if (!start || (!start->from_rest && !time_alignment_.known())) {
     out.odometry.health = health_.before_start(frame, initialiser_.reason());
     return;
   }
@@ -183,6 +190,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   const Duration dt = frame.t - window_.newest().t;
   ImuSegment imu = frame.imu;
   imu.noise = reading_noise_.of(imu);
+  add_stamp_noise(imu);
   Frame predicted = predict(frame, imu);
   const std::vector<TrackedFeature> features = check_readings(frame, imu, predicted);
   out.imu_noise = imu.noise;
@@ -204,6 +212,18 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.marginalise_ms = timer.lap_ms();
 }
 
+/// Between images whose stamps have noise of their own the readings turn and move by as much more or less (Y8).
+void Estimator::add_stamp_noise(ImuSegment& imu) const {
+  const double sigma_s = std::sqrt(2.0) * time_alignment_.stamp_sigma_s();
+  if (imu.empty() || sigma_s == 0) return;
+  const double dt = (imu.samples.back().t - imu.samples.front().t).seconds();
+  const NavState<G>& last = window_.newest().state;
+  const double turn = sigma_s * (last_rate_ - last.bias.gyro_radps).norm(), shift = sigma_s * last.v_FB.norm();
+  imu.noise.gyro = std::hypot(imu.noise.gyro, turn / (imu_noise_.gyro_noise_density_radps_rthz * std::sqrt(dt)));
+  imu.noise.accel =
+      std::hypot(imu.noise.accel, shift / (imu_noise_.accel_noise_density_mps2_rthz * std::sqrt(dt * dt * dt / 3)));
+}
+
 /// Compares images and readings, and returns the features of the cameras that agree. Readings that the images
 /// contradict count less.
 std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
@@ -215,6 +235,8 @@ std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame,
     monitor_.pass(dt);
     return frame.features;
   }
+  monitor_.set_stamp_sigma(time_alignment_.stamp_sigma_s());
+  monitor_.set_noise(imu.noise);
   const Monitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
                                                   predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {

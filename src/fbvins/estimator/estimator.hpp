@@ -23,6 +23,7 @@
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/state_uncertainty.hpp"
 #include "fbvins/estimator/surface_view.hpp"
+#include "fbvins/estimator/time_alignment.hpp"
 #include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/imu/reading_noise.hpp"
 #include "fbvins/types/keyframe.hpp"
@@ -55,6 +56,8 @@ class Estimator {
   StatePrior prior() const;
   WindowSnapshot snapshot() const;
   const Calibration& calibration() const { return calibration_; }
+  /// What the rig's time offset is corrected by (System applies it).
+  Duration time_offset_correction() const { return time_alignment_.correction(); }
   /// For tests and inspection.
   const SlidingWindow& window() const { return window_; }
 
@@ -64,6 +67,7 @@ class Estimator {
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
   TrackedFrame refer_to_stamp(const TrackedFrame& frame) const;
   Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
+  void add_stamp_noise(ImuSegment& imu) const;
   std::vector<TrackedFeature> check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
   void fill_covariances(const WindowSolution& solution, Odometry& out);
@@ -84,6 +88,7 @@ class Estimator {
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
   bool one_camera_;                       ///< the rig has one only
   StateUncertainty uncertainty_;          ///< as of the last usable solve
+  TimeAlignment time_alignment_;
   Exposures exposures_;
   SurfaceFinder surfaces_;
   TrackedFrame referred_;  ///< the newest frame, where not all of it was seen at its stamp

@@ -14,7 +14,7 @@ void Exposures::refer_to_stamp(const ExposureMotion& motion, const Calibration& 
     const int clock = depth_ ? 0 : camera;
     const Shutter& shutter = shutters_[static_cast<std::size_t>(clock)];
     o.rows = o.pixel.y() - shutter.middle_row_px;
-    o.after_s = frame.offsets.of(clock).seconds() + o.rows * shutter.line_delay_s;  // (S1)
+    o.after_s = frame.offsets.of(clock).seconds() + o.rows * (shutter.line_delay_s + line_delay_correction_s_);  // (S1)
     if (o.after_s == 0) return;
     const Pose<B, C0> T_BC = calibration.T_BC(camera);
     const Quat turn = motion.turn(o.after_s);

@@ -22,7 +22,9 @@ class Exposures {
   explicit Exposures(const StereoRig& rig);
 
   /// Whether everything in the frame was seen at its stamp.
-  bool at_stamp(const TrackedFrame& frame) const { return !rolling_ && frame.offsets.all_zero(); }
+  bool at_stamp(const TrackedFrame& frame) const { return !rolling_ && line_delay_correction_s_ == 0 && frame.offsets.all_zero(); }
+  /// Of all cameras, in addition to the rig's.
+  void correct_line_delay(double by_s) { line_delay_correction_s_ = by_s; }
   /// Turns the normalised positions into the axes that the cameras have at the stamp, and fills `rows`, `after_s` and `lever_B`;
   /// pixels stay as seen.
   void refer_to_stamp(const ExposureMotion& motion, const Calibration& calibration, TrackedFrame& frame) const;
@@ -33,6 +35,7 @@ class Exposures {
   };
 
   bool rolling_;
+  double line_delay_correction_s_ = 0;
   bool depth_;  // a depth has its pixel's time
   std::vector<Shutter> shutters_;
 };

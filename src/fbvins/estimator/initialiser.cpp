@@ -65,6 +65,7 @@ ImuSegment joined(ImuSegment first, const ImuSegment& second) {
   if (first.empty()) return second;
   first.samples.insert(first.samples.end(), second.samples.begin() + 1, second.samples.end());
   first.longest_gap = std::max(first.longest_gap, second.longest_gap);
+  first.noise = {std::max(first.noise.gyro, second.noise.gyro), std::max(first.noise.accel, second.noise.accel)};
   return first;
 }
 

@@ -16,6 +16,8 @@ namespace {
 constexpr double kUsual_sigma = 1.5, kUsualFor_s = 0.06;
 /// Times as much while the calibration is being found.
 constexpr double kCalibrating = 6;
+/// And so many standard deviations of what the noise of readings and stamps moves all that is seen.
+constexpr double kSpread_sigma = 2;
 /// Where the images' own pose does not explain them much better, the prediction is not what is wrong.
 constexpr double kBetter = 0.6;
 /// Share of the landmarks that agree with one pose where images can be right against the readings.
@@ -140,8 +142,9 @@ Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observat
   }
   out.noise.gyro = turning_noise_;
   ahead_G_ = middle_of(observations) - predicted.p;
-  const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
   const ResidualMedians at_prediction = camera_residuals(observations, calibration, predicted, v_B);
+  const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s) *
+                          std::hypot(1.0, kSpread_sigma * spread(predicted.q, v_B, at_prediction.focal, dt));
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
@@ -191,6 +194,15 @@ void Monitor::take_unexplained(Duration dt) {
   unexplained_s_ = std::min(kCalm_s, unexplained_s_ + dt.seconds());
   unexplained_ = unexplained_ || unexplained_s_ > kDark_s;
   blind(dt);
+}
+
+/// What the readings' noise and those of two stamps move all features by, in standard deviations of one.
+double Monitor::spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const {
+  const double s = std::max(1e-3, dt.seconds());
+  const double rate = predicted.angularDistance(predicted_) / s + v_B.norm() / std::max(0.3, ahead_G_.norm());
+  const double by_stamps = std::sqrt(2.0) * rate * stamp_sigma_s_;
+  const double by_noise = noise_.gyro * assumed_.gyro_noise_density_radps_rthz * std::sqrt(s);
+  return focal * std::hypot(by_stamps, by_noise);
 }
 
 /// Whether a camera that is off is left out of this image.

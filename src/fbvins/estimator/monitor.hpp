@@ -39,6 +39,10 @@ class Monitor {
   /// with the velocity `v_B`, which counts where not all was seen at the stamp.
   Verdict check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration, const Pose<G, B>& predicted,
                 Duration dt, const Vec3& v_B = Vec3::Zero());
+  /// Standard deviation of when an image was taken: the residuals may be as large as what it moves meanwhile.
+  void set_stamp_sigma(double sigma_s) { stamp_sigma_s_ = sigma_s; }
+  /// Noise of the readings since the image before, of which the prediction is made.
+  void set_noise(const ImuNoiseScale& noise) { noise_ = noise; }
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 
@@ -72,6 +76,7 @@ class Monitor {
   void take_agreement(double excess, Duration dt);
   void take_unexplained(Duration dt);
   bool exclude(bool for_drift_alone, Duration dt);
+  double spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const;
   void follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Duration dt, Verdict& out);
   using OfEachCamera = std::array<Vec2, kMostCameras>;
   void add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt);
@@ -85,6 +90,8 @@ class Monitor {
 
   ImuNoise assumed_;
   bool calibrating_;
+  double stamp_sigma_s_ = 0;
+  ImuNoiseScale noise_;
   double excluded_s_ = 0;        ///< for how long one camera has been excluded for drift alone
   OfEachCamera drift_ = none();  ///< of all that is seen, added up
   double turned_sigma_ = 0;      ///< by which it may be

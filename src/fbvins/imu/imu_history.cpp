@@ -35,8 +35,15 @@ bool ImuHistory::add(const ImuSample& reading) {
   return true;
 }
 
+void ImuHistory::set_time_offset(Duration offset) {
+  if (offset == time_offset_) return;
+  for (ImuSample& reading : readings_) reading.t = reading.t + (time_offset_ - offset);
+  time_offset_ = offset;
+}
+
 ImuSegment ImuHistory::between(Time from, Time to) const {
   ImuSegment segment;
+  segment.time_offset = time_offset_;
   if (readings_.empty() || from >= to) return segment;
   const auto first = std::upper_bound(readings_.begin(), readings_.end(), from, later);
   const auto last = std::lower_bound(first, readings_.end(), to, earlier);

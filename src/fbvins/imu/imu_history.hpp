@@ -33,6 +33,9 @@ class ImuHistory {
   /// A reading with its stamp on the IMU's clock. False (and counted) when it is refused.
   bool add(const ImuSample& reading);
 
+  /// From now on times are on the images' clock by this offset, also of the readings that are here.
+  void set_time_offset(Duration offset);
+
   /// A reading at or after `t` is here, so that a segment up to `t` is final. All times are on the images' clock.
   bool covers(Time t) const { return !readings_.empty() && readings_.back().t >= t; }
 

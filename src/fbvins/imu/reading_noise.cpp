@@ -8,9 +8,18 @@ namespace fbvins {
 namespace {
 
 constexpr double kMeasured_s = 0.25;
-/// Vibration that the assumed noise covers: the highest in six flights of a hexacopter, and about the median of other vehicles.
+/// What vibration counts as, of white noise of its size: it swings back and forth, a turn much more than a shift. Of six flights of a
+/// hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md) and whose
+/// readings have 2.7e-3 and 0.07.
+constexpr double kGyroShare = 0.155, kAccelShare = 0.7;
+/// Axes and scale of an accelerometer that is not calibrated are off by this share (IMUs of cameras and phones, by their data sheets);
+/// what they make of a specific force that changes is wrong for as long as a motion lasts.
+constexpr double kAxes = 0.03, kMotion_s = 0.3, kMean_s = 1;
+/// Readings that differ much less from one another than the calibrated noise says have less; filters in the sensor hide this part.
+constexpr double kHidden = 3;
+/// For single readings: the highest vibration of these flights, about the median of other vehicles, and of noisy sensors so many
+/// standard deviations.
 constexpr double kUsualGyro_radps = 0.07, kUsualAccel_mps2 = 3.0;
-/// Likewise for sensors of more noise: so many times their own.
 constexpr double kUsualNoise = 3;
 /// A single reading that is off by so many times the usual vibration is wrong, or a blow.
 constexpr double kOutlier = 6;
@@ -20,6 +29,11 @@ constexpr int kSameUntilClipped = 4;
 constexpr double kClippedGyro_radps = 0.05, kClippedAccel_mps2 = 15;
 constexpr double kLeastGyroError_radps = 0.5;
 
+/// Factor on the noise of readings that differ from one another by `measured` times that noise.
+double with_vibration(double measured, double share) {
+  return std::hypot(std::min(1.0, kHidden * measured), share * std::sqrt(std::max(0.0, measured * measured - 1)));
+}
+
 /// Readings in a row with the same large number, 0 before the axis has changed for the first time.
 int count_same(int before, double previous, double now, double least) {
   if (now != previous) return 1;
@@ -28,12 +42,21 @@ int count_same(int before, double previous, double now, double least) {
 
 }  // namespace
 
+void ReadingNoise::Changes::add(const Vec3& value, double dt_s) {
+  if (variance < 0) mean = value, variance = 0;
+  const double share = std::min(1.0, dt_s / kMean_s);
+  const Vec3 off = value - mean;
+  mean += share * off;
+  variance += share * (off.squaredNorm() / 3 - variance);
+}
+
 void ReadingNoise::add(const ImuSample& reading) {
   if (!last_.empty() && reading.t <= last_.back().t) return;
   if (last_.size() == 2) {
     const ImuSample &a = last_[0], &b = last_[1];
     const Vec3 gyro = a.gyro_radps - 2 * b.gyro_radps + reading.gyro_radps;
     const Vec3 accel = a.accel_mps2 - 2 * b.accel_mps2 + reading.accel_mps2;
+    changes_.add(reading.accel_mps2, (reading.t - b.t).seconds());
     differences_.push_back({reading.t, gyro.squaredNorm() / 18, accel.squaredNorm() / 18});  // 3 axes, 1 + 4 + 1
     worst_gyro_radps_ = std::max(worst_gyro_radps_, gyro.norm() / 2);
     worst_accel_mps2_ = std::max(worst_accel_mps2_, accel.norm() / 2);
@@ -73,7 +96,8 @@ ImuNoiseScale ReadingNoise::of(const ImuSegment& segment) {
   const double accel_sigma = assumed_.accel_noise_density_mps2_rthz * root_rate;
   const double usual_gyro = std::max(kUsualGyro_radps, kUsualNoise * gyro_sigma);
   const double usual_accel = std::max(kUsualAccel_mps2, kUsualNoise * accel_sigma);
-  out.gyro = std::max(1.0, gyro_radps_ / usual_gyro), out.accel = std::max(1.0, accel_mps2_ / usual_accel);
+  out = {with_vibration(gyro_radps_ / gyro_sigma, kGyroShare), with_vibration(accel_mps2_ / accel_sigma, kAccelShare)};
+  out.accel = std::hypot(out.accel, kAxes * changes_.sigma() * std::sqrt(kMotion_s) / assumed_.accel_noise_density_mps2_rthz);
   // What one reading contributes to the motion, as noise of them all.
   const double root_readings = std::sqrt(static_cast<double>(segment.samples.size()));
   if (worst_gyro_radps_ > kOutlier * std::max(usual_gyro, gyro_radps_))

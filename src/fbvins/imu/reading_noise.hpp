@@ -10,6 +10,8 @@
 // difference", Annals of Mathematical Statistics 1941; here of second order). One owner, one thread.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <deque>
 
 #include "fbvins/types/imu.hpp"
@@ -32,11 +34,19 @@ class ReadingNoise {
     Time t;
     double gyro2, accel2;  ///< squared, one axis
   };
+  /// Mean and variance of an axis over the last second or so.
+  struct Changes {
+    Vec3 mean = Vec3::Zero();
+    double variance = -1;  ///< below zero: nothing came yet
+    void add(const Vec3& value, double dt_s);
+    double sigma() const { return std::sqrt(std::max(0.0, variance)); }
+  };
   void add(const ImuSample& reading);
 
   ImuNoise assumed_;
   std::deque<ImuSample> last_;  ///< two at most
   std::deque<Difference> differences_;
+  Changes changes_;
   int gyro_same_[3] = {}, accel_same_[3] = {};  ///< readings in a row with the same large number
   bool gyro_clipped_ = false, accel_clipped_ = false;
   int clipped_before_ = 0;  ///< segments for which that of an earlier one counts

@@ -10,6 +10,8 @@ namespace {
 constexpr double kLongest_s = 60;
 /// A smaller offset is set to zero; m, rad and m/s.
 constexpr double kNoOffset = 1e-7;
+/// Readings that a correction of the time offset may need again.
+constexpr Duration kMostCorrection{100'000'000};
 
 Mat15 covariance_of(const Odometry& o) {
   Mat15 P = Mat15::Zero();
@@ -34,6 +36,14 @@ NavState<W> PosePropagator::newest_state() const {
   return since_->predict(estimated_state(), -gravity_mps2_ * estimate_->up_W);
 }
 
+/// Of the readings that are here, too.
+void PosePropagator::correct_time_offset(Duration by) {
+  const Duration now = given_offset_ + by;
+  newest_t_ = newest_t_ + (time_offset_ - now);
+  readings_.set_time_offset(now);
+  time_offset_ = now;
+}
+
 std::optional<LivePose> PosePropagator::rebase(const Odometry& estimate) {
   const Time read_until = newest_t_;
   const bool same_world = estimate_ && estimate_->reset_counter == estimate.reset_counter;
@@ -42,7 +52,8 @@ std::optional<LivePose> PosePropagator::rebase(const Odometry& estimate) {
     if (newest_t_ < estimate.t) propagate_to(estimate.t);
     before = newest_state().boxplus(offset_);
   }
-  readings_.forget_before(estimate.t);
+  correct_time_offset(Duration::from_seconds(estimate.time_offset_s));
+  readings_.forget_before(estimate.t - kMostCorrection);
   estimate_ = estimate;
   offset_.setZero();
   since_.reset();

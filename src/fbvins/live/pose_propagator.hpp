@@ -25,6 +25,7 @@ class PosePropagator {
   /// noise: with which the estimator weights the readings. time_offset: t_imu = t_image + offset.
   PosePropagator(const ImuNoise& noise, Duration time_offset, double smoothing_s, double gravity_mps2 = kGravity_mps2)
       : noise_(noise),
+        given_offset_(time_offset),
         time_offset_(time_offset),
         smoothing_s_(smoothing_s),
         gravity_mps2_(gravity_mps2),
@@ -40,10 +41,11 @@ class PosePropagator {
   NavState<W> estimated_state() const { return {estimate_->T_WB, estimate_->v_WB, estimate_->bias}; }
   NavState<W> newest_state() const;
   LivePose newest_pose(Time t, const Vec3& gyro_radps) const;
+  void correct_time_offset(Duration by);
   void decay_offset(double dt_s);
 
   ImuNoise noise_;
-  Duration time_offset_;
+  Duration given_offset_, time_offset_;
   double smoothing_s_;
   double gravity_mps2_;
   ImuHistory readings_;  ///< from the last one at or before the estimate's image on

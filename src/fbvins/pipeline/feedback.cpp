@@ -15,9 +15,11 @@ void Feedback::wait_for(FrameId frame, std::unique_lock<std::mutex>& lock) {
   published_.wait(lock, [&] { return stopped_ || newest_.value >= frame.value - kLag; });
 }
 
-void Feedback::wait_for(FrameId frame) {
+Duration Feedback::time_offset_for(FrameId frame) {
   std::unique_lock lock(mutex_);
   wait_for(frame, lock);
+  const FrameId seen{frame.value - kLag};
+  return seen.valid() ? priors_[static_cast<std::size_t>(seen.value) % priors_.size()].time_offset : Duration{};
 }
 
 Feedback::Message Feedback::for_frame(FrameId frame) {

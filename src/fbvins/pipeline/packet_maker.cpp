@@ -4,6 +4,12 @@
 #include <utility>
 
 namespace fbvins {
+namespace {
+
+/// Readings that a correction of the time offset may need again.
+constexpr Duration kMostCorrection{100'000'000};
+
+}  // namespace
 
 void PacketMaker::push(StereoFrame frame) {
   if (newest_image_ && frame.t <= *newest_image_) {
@@ -20,19 +26,36 @@ void PacketMaker::push(Anchor anchor) {
   anchors_.push_back(std::move(anchor));
 }
 
-std::optional<SensorPacket> PacketMaker::next(bool flush) {
-  if (waiting_.empty()) return std::nullopt;
+bool PacketMaker::is_ready(bool flush) const {
+  if (waiting_.empty()) return false;
   const Time t = waiting_.front().t;
   const bool waited_long = (*newest_image_ - t).seconds() > options_.max_imu_wait_s;
-  if (!imu_.covers(t) && !flush && !waited_long) return std::nullopt;
+  return imu_.covers(t) || flush || waited_long;
+}
+
+std::optional<FrameId> PacketMaker::next_id(bool flush) const {
+  return is_ready(flush) ? std::optional(FrameId{next_frame_}) : std::nullopt;
+}
+
+void PacketMaker::correct_time_offset(Duration by) {
+  const Duration now = given_ + by;
+  if (previous_) previous_ = *previous_ + (time_offset_ - now);
+  imu_.set_time_offset(now);
+  time_offset_ = now;
+}
+
+std::optional<SensorPacket> PacketMaker::next(bool flush) {
+  if (!is_ready(flush)) return std::nullopt;
+  const Time t = waiting_.front().t;
   SensorPacket packet;
   packet.id = FrameId{next_frame_++};
   packet.frame = std::move(waiting_.front());
   packet.anchors = std::exchange(anchors_, {});
   waiting_.pop_front();
-  if (previous_image_) packet.imu = imu_.between(*previous_image_, t);
-  imu_.forget_before(t);
-  previous_image_ = t;
+  packet.imu.time_offset = time_offset_;
+  if (previous_) packet.imu = imu_.between(*previous_, t);
+  imu_.forget_before(t - kMostCorrection);
+  previous_ = t;
   return packet;
 }
 

@@ -18,7 +18,7 @@ class PacketMaker {
  public:
   /// time_offset: t_imu = t_image + offset. What comes out is on the images' clock.
   PacketMaker(const InputOptions& options, const ImuNoise& imu, Duration time_offset)
-      : options_(options), imu_(imu, time_offset) {}
+      : options_(options), imu_(imu, time_offset), given_(time_offset), time_offset_(time_offset) {}
 
   void push(const ImuSample& sample) { imu_.add(sample); }
   void push(StereoFrame frame);
@@ -26,14 +26,22 @@ class PacketMaker {
   void push(Anchor anchor);
   /// The next image that is ready; with `flush`, the next image even if its readings never came.
   std::optional<SensorPacket> next(bool flush = false);
+  /// The number of the next image, where one waits and could come out.
+  std::optional<FrameId> next_id(bool flush = false) const;
+  /// What the given time offset is corrected by, from the next image on.
+  void correct_time_offset(Duration by);
   InputCounts counts() const;
 
  private:
+  bool is_ready(bool flush) const;
+
   InputOptions options_;
   ImuHistory imu_;
+  Duration given_, time_offset_;
   std::deque<StereoFrame> waiting_;
   std::vector<Anchor> anchors_;
-  std::optional<Time> newest_image_, previous_image_;
+  std::optional<Time> newest_image_;
+  std::optional<Time> previous_;  ///< when the image before was taken, by the time offset of now
   std::int64_t next_frame_ = 0;
   int backward_ = 0;
 };

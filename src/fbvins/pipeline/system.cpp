@@ -178,8 +178,11 @@ struct System::Impl {
 
   /// Sends on the packets that are ready; with `flush`, all that wait.
   void forward(bool flush) {
-    while (std::optional<SensorPacket> packet = packet_maker.next(flush)) {
-      feedback.wait_for(packet->id);  // the frontend could not begin earlier, and the caller sees a failure in time
+    while (const std::optional<FrameId> id = packet_maker.next_id(flush)) {
+      // The frontend could not begin earlier, and the caller sees a failure in time.
+      packet_maker.correct_time_offset(feedback.time_offset_for(*id));
+      std::optional<SensorPacket> packet = packet_maker.next(flush);
+      if (!packet) return;  // by the corrected offset its readings are not here yet
       hand_on(tracking, std::move(*packet));
     }
   }
@@ -289,6 +292,10 @@ Result<void> System::finish() { return impl_->finish(); }
 Result<void> System::status() const { return impl_->status.get(); }
 InputCounts System::input_counts() const { return impl_->packet_maker.counts(); }
 int System::keyframes_left_out() const { return impl_->keyframes_left_out; }
-Calibration System::calibration() const { return impl_->lenses.of_lenses(impl_->estimator.calibration()); }
+Calibration System::calibration() const {
+  Calibration out = impl_->lenses.of_lenses(impl_->estimator.calibration());
+  out.time_offset_s += impl_->estimator.time_offset_correction().seconds();
+  return out;
+}
 
 }  // namespace fbvins

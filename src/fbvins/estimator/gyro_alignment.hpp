@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the gyroscope and the directions of tracks say of one another, without depth, scale or a start: the camera's time offset,
+// the line delay of its shutter, the rotation of its mounting and the gyroscope's bias (docs/derivations/gyro_alignment.md, Y1-Y6).
+//
+//   GyroAlignment alignment(rig.T_BC0.R(), {});
+//   alignment.add(frame);                                   // each tracked frame
+//   if (const auto found = alignment.solve()) use(found->time_offset_s, found->time_offset_sigma_s());
+//
+// One owner, one thread. Memory: the newest 150 pairs of images of at most 40 tracks, and their readings.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+/// Standard deviations before any measurement.
+struct GyroAlignmentPrior {
+  double gyro_bias_radps = 0.1;    ///< as of an unknown IMU (initial_prior.cpp)
+  double time_offset_s = 0.05;     ///< of what is given: cameras behind a driver's buffers are late by up to a tenth of a second
+  double line_delay_s = 40e-6;     ///< the common sensors take 10 to 100 us a row
+  double rotation_rad = 0.02;      ///< of a mounting by its drawing
+};
+
+/// Corrections of what the rig says.
+struct GyroAlignmentEstimate {
+  static constexpr int kSize = 8;
+  using Vec = Eigen::Matrix<double, kSize, 1>;
+  using Mat = Eigen::Matrix<double, kSize, kSize>;
+
+  Vec x = Vec::Zero();
+  Mat covariance = Mat::Zero();
+  double stamp_sigma_s = 0;  ///< noise of each image's stamp, 0 where it does not show
+  double rms = 0;  ///< of the residuals, in standard deviations of a track
+  int pairs = 0;
+
+  Vec3 gyro_bias_radps() const { return x.head<3>(); }
+  double time_offset_s() const { return x(3); }  ///< t_imu = t_image + the rig's offset + this
+  double line_delay_s() const { return x(4); }
+  Vec3 rotation_rad() const { return x.tail<3>(); }  ///< R_BC = exp(rotation) R_BC of the rig
+  double time_offset_sigma_s() const { return std::sqrt(covariance(3, 3)); }
+  double line_delay_sigma_s() const { return std::sqrt(covariance(4, 4)); }
+};
+
+class GyroAlignment {
+ public:
+  /// The largest offset, in both directions, that is looked for.
+  static constexpr double kLargestOffset_s = 0.1;
+
+  /// `line_delay_s`: the rig's; what is found is in addition to it.
+  GyroAlignment(const Mat3& R_BC, double middle_row_px, double line_delay_s, const GyroAlignmentPrior& prior)
+      : R_BC_(R_BC), middle_row_px_(middle_row_px), line_delay_s_(line_delay_s), prior_(prior) {}
+
+  /// A frame with the readings since the one before. `given`: the rig's time offset; the segment says with which it was cut.
+  void add(const TrackedFrame& frame, Duration given);
+  /// Nothing before any pair of images has its readings.
+  std::optional<GyroAlignmentEstimate> solve();
+  /// Of images, that are compared.
+  int pairs() const { return static_cast<int>(pairs_.size()); }
+
+ private:
+  struct Sight {
+    TrackId id;
+    Vec3 ray_B;
+    double sigma, rows;
+  };
+  struct View {
+    Time t;  ///< on the IMU's clock, by the rig's offset
+    std::vector<Sight> sights;
+  };
+  /// Directions of a track in two images; the direction of the translation between them lies in their plane.
+  struct Plane {
+    Vec3 a, b;
+    double sigma, rows_a, rows_b;
+  };
+  struct Pair {
+    Time from, to;
+    std::vector<Plane> planes;
+  };
+  struct Rotation {
+    Time t;
+    Quat q;  ///< of the readings since the first, without bias
+  };
+  struct Normal {
+    GyroAlignmentEstimate::Mat H = GyroAlignmentEstimate::Mat::Zero();
+    GyroAlignmentEstimate::Vec g = GyroAlignmentEstimate::Vec::Zero();
+    double cost = 0;
+    int rows = 0;
+    std::vector<double> late_s;  ///< what each pair's second stamp is off by, where it shows
+  };
+
+  void add_readings(const ImuSegment& segment);
+  void make_pairs();
+  Quat orientation(Time t) const;
+  Vec3 rate(Time t) const;
+  Normal linearise(const GyroAlignmentEstimate::Vec& x) const;
+  void add_pair(const Pair& pair, const GyroAlignmentEstimate::Vec& x, Normal& out) const;
+  GyroAlignmentEstimate solve_from(double time_offset_s) const;
+
+  Mat3 R_BC_;
+  double middle_row_px_, line_delay_s_;
+  GyroAlignmentPrior prior_;
+  std::deque<View> views_;  ///< whose pairs are not made yet, and those before that they are compared with
+  std::size_t paired_ = 0;  ///< of these
+  std::deque<Pair> pairs_;
+  std::deque<Rotation> turned_;
+  std::optional<Vec3> last_rate_;
+  double last_offset_s_ = 0;
+  bool settled_ = false;
+};
+
+}  // namespace fbvins

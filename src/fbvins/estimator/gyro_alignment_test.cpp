@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/gyro_alignment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/estimator/time_alignment.hpp"
+
+namespace fbvins {
+namespace gyro_alignment_test {
+
+constexpr double kFocal_px = 450, kPixel_sigma = 0.6, kMiddle_px = 240;
+const Vec3 kBias(0.02, -0.01, 0.03);
+
+/// A camera in the IMU's axes that is turned and moved by hand among points; `late_s`: the images' stamps, beyond the exposure.
+struct Hand {
+  double late_s = 0, line_delay_s = 0, jitter_s = 0, rate_radps = 1;
+  Rng rng{7};
+  std::vector<Vec3> points;
+
+  Hand() {
+    for (int i = 0; i < 400; ++i)
+      points.emplace_back(rng.uniform(-6, 6), rng.uniform(-4, 4), rng.uniform(2, 7));
+  }
+  Vec3 rate(double t) const {
+    return rate_radps * Vec3(std::sin(7 * t), std::cos(5 * t + 1), 0.6 * std::sin(9 * t));
+  }
+  Vec3 position(double t) const { return {0.15 * std::sin(3 * t), 0.1 * std::cos(4 * t), 0.1 * std::sin(2 * t)}; }
+
+  /// Images at 20 Hz with the readings between them, at 200 Hz.
+  std::vector<TrackedFrame> frames(double seconds, Duration cut_by = {}) {
+    constexpr double kStep_s = 0.0005;
+    std::vector<Quat> turned{Quat::Identity()};
+    for (double t = -0.5; t < seconds + 0.5; t += kStep_s)
+      turned.push_back((turned.back() * so3_exp(Vec3(kStep_s * rate(t + kStep_s / 2)))).normalized());
+    const auto orientation = [&](double t) {
+      const double at = (t + 0.5) / kStep_s;
+      const auto k = static_cast<std::size_t>(at);
+      return turned[k].slerp(at - static_cast<double>(k), turned[k + 1]);
+    };
+    std::vector<TrackedFrame> out;
+    double before = -0.05;
+    for (int n = 0; 0.05 * n < seconds; ++n) {
+      TrackedFrame frame;
+      const double exposed = 0.05 * n, stamp = exposed + late_s + jitter_s * rng.uniform(-1, 1);
+      frame.t = Time{} + Duration::from_seconds(10 + stamp);
+      frame.imu.time_offset = cut_by;
+      frame.imu.samples.push_back({frame.t - Duration::from_seconds(stamp - before), {}, {}});
+      for (int k = static_cast<int>(std::ceil(before / 0.005)); k * 0.005 <= stamp; ++k) {
+        const double t = k * 0.005;  // on the images' clock; on the IMU's it is later by what the frame was cut with
+        const Vec3 noise(rng.normal(), rng.normal(), rng.normal());
+        frame.imu.samples.push_back({Time{} + Duration::from_seconds(10 + t), rate(t + cut_by.seconds()) + kBias + 0.005 * noise, {}});
+      }
+      frame.imu.samples.push_back({frame.t, {}, {}});
+      before = stamp;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        double rows = 0;
+        Vec3 p = Vec3::Zero();
+        for (int k = 0; k < 3; ++k) {  // the row says when, and when says which row
+          const double t = exposed + line_delay_s * rows;
+          p = orientation(t).conjugate() * Vec3(points[i] - position(t));
+          rows = kFocal_px * p.y() / p.z();
+        }
+        const Vec2 pixel = kFocal_px * p.hnormalized() + kPixel_sigma * Vec2(rng.normal(), rng.normal());
+        if (p.z() < 0.5 || std::abs(pixel.x()) > 320 || std::abs(pixel.y()) > kMiddle_px) continue;
+        TrackedFeature f;
+        f.id = TrackId{static_cast<std::int64_t>(i)};
+        f.left = Observation{pixel + Vec2(320, kMiddle_px), pixel / kFocal_px, kFocal_px / kPixel_sigma * Mat2::Identity()};
+        frame.features.push_back(f);
+      }
+      out.push_back(std::move(frame));
+    }
+    return out;
+  }
+};
+
+std::optional<GyroAlignmentEstimate> found(Hand hand, double seconds) {
+  GyroAlignment alignment(Mat3::Identity(), kMiddle_px, 0, {});
+  for (const TrackedFrame& frame : hand.frames(seconds)) alignment.add(frame, {});
+  return alignment.solve();
+}
+
+TEST(GyroAlignment, FindsOffsetsInBothDirectionsWithinASecondAndAHalf) {
+  for (const double late_s : {-0.08, -0.02, 0.0, 0.05, 0.09}) {
+    Hand hand;
+    hand.late_s = late_s;
+    const auto estimate = found(hand, 1.5);
+    ASSERT_TRUE(estimate);
+    EXPECT_NEAR(estimate->time_offset_s(), -late_s, 0.0015) << late_s;
+    EXPECT_LT(std::abs(estimate->time_offset_s() + late_s), 3 * estimate->time_offset_sigma_s());
+    EXPECT_LT((estimate->gyro_bias_radps() - kBias).norm(), 0.01);
+  }
+}
+
+TEST(GyroAlignment, FindsTheLineDelayBeside) {
+  Hand hand;
+  hand.late_s = 0.03, hand.line_delay_s = 60e-6;
+  const auto estimate = found(hand, 5);
+  ASSERT_TRUE(estimate);
+  EXPECT_NEAR(estimate->time_offset_s(), -0.03, 0.001);
+  EXPECT_NEAR(estimate->line_delay_s(), 60e-6, 6e-6);
+  EXPECT_LT(std::abs(estimate->line_delay_s() - 60e-6), 3 * estimate->line_delay_sigma_s());
+}
+
+TEST(GyroAlignment, StampsWithNoiseOfTheirOwnAreSaid) {
+  Hand exact, jittered;
+  jittered.jitter_s = 0.003;  // uniform: a standard deviation of 1.7 ms
+  EXPECT_LT(found(exact, 5)->stamp_sigma_s, 0.0004);
+  EXPECT_NEAR(found(jittered, 5)->stamp_sigma_s, 0.0017, 0.0007);
+}
+
+TEST(GyroAlignment, WithoutMotionNothingIsKnown) {
+  Hand still;
+  still.rate_radps = 0;
+  const auto estimate = found(still, 2);
+  ASSERT_TRUE(estimate);
+  EXPECT_GT(estimate->time_offset_sigma_s(), 0.02);
+}
+
+TEST(GyroAlignment, NoPairNoEstimate) {
+  GyroAlignment alignment(Mat3::Identity(), kMiddle_px, 0, {});
+  EXPECT_FALSE(alignment.solve());
+  alignment.add(TrackedFrame{}, {});
+  EXPECT_FALSE(alignment.solve());
+}
+
+TEST(TimeAlignment, AKnownOffsetIsLeftAsItIsAndAWrongOneIsCorrected) {
+  for (const double late_s : {0.0, 0.04}) {
+    TimeAlignment alignment(StereoRig{}, true);
+    Hand hand;
+    hand.late_s = late_s;
+    for (const TrackedFrame& frame : hand.frames(2)) alignment.add(frame, false);
+    if (late_s == 0) EXPECT_EQ(alignment.correction(), Duration{});
+    else EXPECT_NEAR(alignment.correction().seconds(), -late_s, 0.002);
+  }
+}
+
+TEST(TimeAlignment, InFlightItIsCorrectedInSteps) {
+  TimeAlignment alignment(StereoRig{}, true);
+  Hand hand;
+  hand.late_s = 0.04;
+  Duration before{};
+  for (const TrackedFrame& frame : hand.frames(4)) {
+    alignment.add(frame, true);
+    EXPECT_LE(std::abs((alignment.correction() - before).seconds()), 0.0041);
+    before = alignment.correction();
+  }
+  EXPECT_NEAR(before.seconds(), -0.04, 0.002);
+}
+
+}  // namespace gyro_alignment_test
+}  // namespace fbvins

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/time_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+/// Solved after so many images: before the first start, and in flight.
+constexpr int kEachBefore = 2, kEachInFlight = 20;
+/// An offset is corrected where it is certain: by this much, and by so many standard deviations.
+constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
+/// A line delay likewise: global shutters stay what they are.
+constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4;
+/// In flight the correction is made in steps: a pose must not lie before the one before it.
+constexpr Duration kStep{4'000'000};
+/// A window that began with another offset has forgotten it after this time.
+constexpr double kForgotten_s = 3;
+
+}  // namespace
+
+TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled)
+    : enabled_(enabled),
+      given_(Duration::from_seconds(rig.time_offset_s)),
+      alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {}) {}
+
+bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
+  if (!enabled_) return false;
+  now_ = frame.t;
+  const bool changed = cut_by_ && std::abs((frame.imu.time_offset - *cut_by_).seconds()) > kStep.seconds();
+  cut_by_ = frame.imu.time_offset;
+  alignment_.add(frame, given_);
+  if (++frames_ % (running ? kEachInFlight : kEachBefore) == 0) solve();
+  if (correction_ != found_) changed_ = now_;
+  const Duration missing = found_ - correction_;
+  correction_ = running ? correction_ + std::clamp(missing, -kStep, kStep) : found_;
+  return changed;
+}
+
+void TimeAlignment::solve() {
+  const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
+  if (!found) return;
+  jitter_s_ = found->stamp_sigma_s;
+  const double off_s = std::abs(found->time_offset_s() - found_.seconds());
+  if (off_s > kLeast_s && off_s > kCertain_sigma * found->time_offset_sigma_s())
+    found_ = Duration::from_seconds(found->time_offset_s());
+  const double line_off_s = std::abs(found->line_delay_s() - line_delay_s_);
+  if (line_off_s > kLeastLine_s && line_off_s > kCertainLine_sigma * found->line_delay_sigma_s()) line_delay_s_ = found->line_delay_s();
+}
+
+double TimeAlignment::stamp_sigma_s() const {
+  const bool settling = changed_ && (now_ - *changed_).seconds() < kForgotten_s;
+  return std::hypot(jitter_s_, settling ? std::max(0.002, std::abs((found_ - correction_).seconds())) : 0.0);
+}
+
+}  // namespace fbvins

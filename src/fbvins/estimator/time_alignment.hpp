@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The time offset between images and IMU that the calibration does not know: found by gyroscope and tracks (gyro_alignment.hpp),
+// before the first start at once, in flight in steps. And the noise of the stamps, by which single images are early or late
+// (docs/derivations/gyro_alignment.md, Y6-Y8).
+//
+//   TimeAlignment alignment(rig, true);
+//   if (alignment.add(frame, running)) restart_the_start();       // frames from here on are cut by another offset
+//   apply(alignment.correction());                                // two images later: the feedback's way
+//
+// One owner, one thread.
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/gyro_alignment.hpp"
+
+namespace fbvins {
+
+class TimeAlignment {
+ public:
+  TimeAlignment(const StereoRig& rig, bool enabled);
+
+  /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight.
+  bool add(const TrackedFrame& frame, bool running);
+  /// Whether enough was seen to notice an offset that would spoil a start in motion.
+  bool known() const { return !enabled_ || alignment_.pairs() >= kFewestForStart; }
+  Duration correction() const { return correction_; }
+  /// What the line delay of the rig's shutters is corrected by.
+  double line_delay_correction_s() const { return line_delay_s_; }
+  /// Standard deviation of when an image was taken: the noise of its stamp, and what the offset is known to be wrong by.
+  double stamp_sigma_s() const;
+
+ private:
+  /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
+  static constexpr int kFewestForStart = 8;
+  void solve();
+
+  bool enabled_;
+  Duration given_;
+  GyroAlignment alignment_;
+  int frames_ = 0;
+  Duration correction_{}, found_{};
+  double line_delay_s_ = 0, jitter_s_ = 0;
+  std::optional<Time> changed_;  ///< the correction, last
+  Time now_;
+  std::optional<Duration> cut_by_;
+};
+
+}  // namespace fbvins
