@@ -86,7 +86,7 @@ Result<Flight> process(const FlightArguments& arguments, const Config& config, D
 std::optional<RefinedCalibration> refined_calibration(const Calibration& found, const StereoRig& rig, const EstimatorOptions& o) {
   RefinedCalibration out;
   if (o.estimate_time_offset || found.time_offset_s != 0) out.time_offset_s = rig.time_offset_s + found.time_offset_s;
-  if (o.estimate_line_delay) out.line_delay_s = rig.line_delay_s + found.line_delay_s;
+  if (o.estimate_line_delay || found.line_delay_s != 0) out.line_delay_s = rig.line_delay_s + found.line_delay_s;
   if (o.estimate_extrinsics && !rig.depth)
     for (int i = 0; i < std::min(2, rig.camera_count()); ++i) out.T_BC.push_back(found.T_BC(i));
   if (!out.time_offset_s && !out.line_delay_s && out.T_BC.empty()) return std::nullopt;

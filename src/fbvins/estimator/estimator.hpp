@@ -56,8 +56,8 @@ class Estimator {
   StatePrior prior() const;
   WindowSnapshot snapshot() const;
   const Calibration& calibration() const { return calibration_; }
-  /// What the rig's time offset is corrected by (System applies it).
-  Duration time_offset_correction() const { return time_alignment_.correction(); }
+  /// What the rig's time offset and line delay are corrected by (System applies the first).
+  const TimeAlignment& time_alignment() const { return time_alignment_; }
   /// For tests and inspection.
   const SlidingWindow& window() const { return window_; }
 

@@ -11,7 +11,7 @@ constexpr double kMeasured_s = 0.25;
 /// What vibration counts as, of white noise of its size: it swings back and forth, a turn much more than a shift. Of six flights of a
 /// hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md) and whose
 /// readings have 2.7e-3 and 0.07.
-constexpr double kGyroShare = 0.155, kAccelShare = 0.7;
+constexpr double kGyroShare = 0.25, kAccelShare = 1;
 /// Axes and scale of an accelerometer that is not calibrated are off by this share (IMUs of cameras and phones, by their data sheets);
 /// what they make of a specific force that changes is wrong for as long as a motion lasts.
 constexpr double kAxes = 0.03, kMotion_s = 0.3, kMean_s = 1;

@@ -294,7 +294,8 @@ InputCounts System::input_counts() const { return impl_->packet_maker.counts(); 
 int System::keyframes_left_out() const { return impl_->keyframes_left_out; }
 Calibration System::calibration() const {
   Calibration out = impl_->lenses.of_lenses(impl_->estimator.calibration());
-  out.time_offset_s += impl_->estimator.time_offset_correction().seconds();
+  out.time_offset_s += impl_->estimator.time_alignment().correction().seconds();
+  out.line_delay_s += impl_->estimator.time_alignment().line_delay_correction_s();
   return out;
 }
 
