@@ -235,8 +235,7 @@ std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame,
     monitor_.pass(dt);
     return frame.features;
   }
-  monitor_.set_stamp_sigma(time_alignment_.stamp_sigma_s());
-  monitor_.set_noise(imu.noise);
+  monitor_.expect({time_alignment_.stamp_sigma_s(), uncertainty_.velocity_sigma_mps(), imu.noise});
   const Monitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
                                                   predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {

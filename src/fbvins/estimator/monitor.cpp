@@ -18,6 +18,11 @@ constexpr double kUsual_sigma = 1.5, kUsualFor_s = 0.06;
 constexpr double kCalibrating = 6;
 /// And so many standard deviations of what the noise of readings and stamps moves all that is seen.
 constexpr double kSpread_sigma = 2;
+constexpr double kNearest_m = 0.3;
+/// What all residuals of an image have in common, on average where all is well: EuRoC's MH_01. A rig whose lens, axes and clocks are known
+/// less well has more, and is given as many times the room, up to a limit; learned from images that are in no contradiction.
+constexpr double kUsualShift = 0.17, kMostRoom = 3, kLargestLearned = 1;
+constexpr double kLearnedAtFirst_s = 0.5, kLearnedOver_s = 30;
 /// Where the images' own pose does not explain them much better, the prediction is not what is wrong.
 constexpr double kBetter = 0.6;
 /// Share of the landmarks that agree with one pose where images can be right against the readings.
@@ -60,9 +65,14 @@ Vec3 middle_of(const std::vector<LandmarkObservation>& observations) {
 
 }  // namespace
 
+Monitor::Monitor(const ImuNoise& assumed, bool calibrating)
+    : assumed_(assumed), calibrating_(calibrating), usual_shift_(kUsualShift) {}
+
 void Monitor::restart() {
   TiltCheck tilt = std::move(tilt_);
+  const double usual_shift = usual_shift_, learned_s = learned_s_;
   *this = Monitor(assumed_, calibrating_);
+  usual_shift_ = usual_shift, learned_s_ = learned_s;
   tilt_ = std::move(tilt);
   tilt_.restart();
 }
@@ -143,9 +153,11 @@ Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observat
   out.noise.gyro = turning_noise_;
   ahead_G_ = middle_of(observations) - predicted.p;
   const ResidualMedians at_prediction = camera_residuals(observations, calibration, predicted, v_B);
-  const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s) *
+  const double room = std::clamp(usual_shift_ / kUsualShift, 1.0, kMostRoom);
+  const double patience = room * (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s) *
                           std::hypot(1.0, kSpread_sigma * spread(predicted.q, v_B, at_prediction.focal, dt));
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
+  learn(at_prediction.shift, patience / room, dt);
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
   if (excess < 0 && !drifting) {
@@ -196,13 +208,22 @@ void Monitor::take_unexplained(Duration dt) {
   blind(dt);
 }
 
-/// What the readings' noise and those of two stamps move all features by, in standard deviations of one.
+void Monitor::learn(const OfEachCamera& shift, double patience, Duration dt) {
+  if (contradicted_) return;
+  double largest = 0;
+  for (const Vec2& of_camera : shift) largest = std::max(largest, of_camera.norm() / patience);
+  learned_s_ = std::min(kLearnedOver_s, learned_s_ + dt.seconds());
+  const double share = std::min(1.0, dt.seconds() / (kLearnedAtFirst_s + learned_s_));
+  usual_shift_ += share * (std::min(largest, kLargestLearned) - usual_shift_);
+}
+
+/// What the noise of the readings and of two stamps and an uncertain velocity move all features by, in standard deviations of one.
 double Monitor::spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const {
   const double s = std::max(1e-3, dt.seconds());
-  const double rate = predicted.angularDistance(predicted_) / s + v_B.norm() / std::max(0.3, ahead_G_.norm());
-  const double by_stamps = std::sqrt(2.0) * rate * stamp_sigma_s_;
-  const double by_noise = noise_.gyro * assumed_.gyro_noise_density_radps_rthz * std::sqrt(s);
-  return focal * std::hypot(by_stamps, by_noise);
+  const double ahead_m = std::max(kNearest_m, ahead_G_.norm());
+  const double by_stamps = std::sqrt(2.0) * expected_.stamp_s * (predicted.angularDistance(predicted_) / s + v_B.norm() / ahead_m);
+  const double by_noise = expected_.noise.gyro * assumed_.gyro_noise_density_radps_rthz * std::sqrt(s);
+  return focal * std::hypot(by_stamps, by_noise, s * expected_.velocity_mps / ahead_m);
 }
 
 /// Whether a camera that is off is left out of this image.

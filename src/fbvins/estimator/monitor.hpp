@@ -31,7 +31,7 @@ class Monitor {
   };
 
   /// `calibrating`: mounting or time offset are still being found, which contradict the readings, too.
-  Monitor(const ImuNoise& assumed, bool calibrating) : assumed_(assumed), calibrating_(calibrating) {}
+  Monitor(const ImuNoise& assumed, bool calibrating);
 
   /// A window begins.
   void restart();
@@ -39,10 +39,13 @@ class Monitor {
   /// with the velocity `v_B`, which counts where not all was seen at the stamp.
   Verdict check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration, const Pose<G, B>& predicted,
                 Duration dt, const Vec3& v_B = Vec3::Zero());
-  /// Standard deviation of when an image was taken: the residuals may be as large as what it moves meanwhile.
-  void set_stamp_sigma(double sigma_s) { stamp_sigma_s_ = sigma_s; }
-  /// Noise of the readings since the image before, of which the prediction is made.
-  void set_noise(const ImuNoiseScale& noise) { noise_ = noise; }
+  /// Of the next prediction, standard deviations: what all residuals of an image may have in common.
+  struct Uncertainty {
+    double stamp_s = 0;       ///< when an image was taken
+    double velocity_mps = 0;  ///< of the image before
+    ImuNoiseScale noise;      ///< of the readings since
+  };
+  void expect(const Uncertainty& prediction) { expected_ = prediction; }
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 
@@ -72,13 +75,14 @@ class Monitor {
   Mat3 velocity_doubt(const Vec3& v_GB) const { return doubt_.velocity_covariance(v_GB); }
 
  private:
+  using OfEachCamera = std::array<Vec2, kMostCameras>;
   void blind(Duration dt);
   void take_agreement(double excess, Duration dt);
   void take_unexplained(Duration dt);
   bool exclude(bool for_drift_alone, Duration dt);
+  void learn(const OfEachCamera& shift, double patience, Duration dt);
   double spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const;
   void follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Duration dt, Verdict& out);
-  using OfEachCamera = std::array<Vec2, kMostCameras>;
   void add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt);
   double largest_drift() const;
   static OfEachCamera none() {
@@ -90,8 +94,8 @@ class Monitor {
 
   ImuNoise assumed_;
   bool calibrating_;
-  double stamp_sigma_s_ = 0;
-  ImuNoiseScale noise_;
+  Uncertainty expected_;
+  double usual_shift_, learned_s_ = 0;  ///< of this rig's images, in standard deviations of a feature, and over which time
   double excluded_s_ = 0;        ///< for how long one camera has been excluded for drift alone
   OfEachCamera drift_ = none();  ///< of all that is seen, added up
   double turned_sigma_ = 0;      ///< by which it may be

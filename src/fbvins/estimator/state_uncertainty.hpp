@@ -19,13 +19,15 @@ class StateUncertainty {
       : calibrated_scale_sigma_(calibrated_scale_sigma), one_camera_(one_camera), gravity_mps2_(gravity_mps2) {}
 
   /// A window begins.
-  void restart() { up_sigma_rad_ = scale_sigma_ = 0; }
+  void restart() { up_sigma_rad_ = scale_sigma_ = velocity_sigma_mps_ = 0; }
   /// The covariances of the pose, the velocity and the biases, levelled, and scale_sigma. `covariance`: of the window's
   /// (p, theta, v, bg, ba, tilt); `mean_rate_B`: the turning rate in the window, rad/s.
   void fill(const Mat17& covariance, const NavState<G>& newest, const Tilt& tilt, const Vec3& mean_rate_B, Odometry& out);
 
   /// Of up's direction about its less certain axis.
   double up_sigma_rad() const { return up_sigma_rad_; }
+  /// Of an axis.
+  double velocity_sigma_mps() const { return velocity_sigma_mps_; }
   /// With one camera: relative standard deviation of the scale when the motion last showed it; otherwise 0.
   double scale_sigma() const { return scale_sigma_; }
 
@@ -33,7 +35,7 @@ class StateUncertainty {
   double calibrated_scale_sigma_;
   bool one_camera_;
   double gravity_mps2_;
-  double up_sigma_rad_ = 0, scale_sigma_ = 0;
+  double up_sigma_rad_ = 0, scale_sigma_ = 0, velocity_sigma_mps_ = 0;
 };
 
 }  // namespace fbvins

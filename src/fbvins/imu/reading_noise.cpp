@@ -23,9 +23,10 @@ constexpr double kUsualGyro_radps = 0.07, kUsualAccel_mps2 = 3.0;
 constexpr double kUsualNoise = 3;
 /// A single reading that is off by so many times the usual vibration is wrong, or a blow.
 constexpr double kOutlier = 6;
-/// An axis that gives the same number so often, at a number this large, is at the end of its range; it may be wrong by as much
-/// again.
+/// An axis that gives the same number so often, at a number this large and the largest so far, while the others change, is at the end of
+/// its range; it may be wrong by as much again. Readings of which nothing changes are repeated ones.
 constexpr int kSameUntilClipped = 4;
+constexpr double kOfLargest = 0.9;
 constexpr double kClippedGyro_radps = 0.05, kClippedAccel_mps2 = 15;
 constexpr double kLeastGyroError_radps = 0.5;
 
@@ -60,8 +61,11 @@ void ReadingNoise::add(const ImuSample& reading) {
     differences_.push_back({reading.t, gyro.squaredNorm() / 18, accel.squaredNorm() / 18});  // 3 axes, 1 + 4 + 1
     worst_gyro_radps_ = std::max(worst_gyro_radps_, gyro.norm() / 2);
     worst_accel_mps2_ = std::max(worst_accel_mps2_, accel.norm() / 2);
-    for (int k = 0; k < 3; ++k) {
-      gyro_same_[k] = count_same(gyro_same_[k], b.gyro_radps(k), reading.gyro_radps(k), kClippedGyro_radps);
+    largest_gyro_radps_ = std::max(largest_gyro_radps_, reading.gyro_radps.cwiseAbs().maxCoeff());
+    const bool repeated = reading.gyro_radps == b.gyro_radps;
+    for (int k = 0; k < 3 && !repeated; ++k) {
+      gyro_same_[k] = count_same(gyro_same_[k], b.gyro_radps(k), reading.gyro_radps(k),
+                                 std::max(kClippedGyro_radps, kOfLargest * largest_gyro_radps_));
       accel_same_[k] = count_same(accel_same_[k], b.accel_mps2(k), reading.accel_mps2(k), kClippedAccel_mps2);
       gyro_clipped_ = gyro_clipped_ || gyro_same_[k] >= kSameUntilClipped;
       accel_clipped_ = accel_clipped_ || accel_same_[k] >= kSameUntilClipped;
