@@ -19,11 +19,12 @@ constexpr double kBegun_s = 2;
 constexpr double kRemembered_s = 30;
 
 /// A change of a bias in standard deviations, of which `floor` is the least. Of a consistent estimate the covariance of a change
-/// is what it gained or lost meanwhile.
+/// is what it gained or lost meanwhile; while it is still uncertain, errors of linearisation move it by as much as it is uncertain.
 double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, double floor) {
   const Eigen::SelfAdjointEigenSolver<Mat3> gained(before - after);
   const Vec3 along = gained.eigenvectors().transpose() * change;
-  return std::sqrt((along.array().square() / (gained.eigenvalues().array().abs() + floor * floor)).sum());
+  const double uncertain = after.trace() / 3;
+  return std::sqrt((along.array().square() / (gained.eigenvalues().array().abs() + uncertain + floor * floor)).sum());
 }
 
 bool moved(const BiasEstimate& from, const BiasEstimate& to, double accel_mps2, double gyro_radps) {
