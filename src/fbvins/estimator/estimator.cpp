@@ -235,7 +235,7 @@ std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame,
     monitor_.pass(dt);
     return frame.features;
   }
-  monitor_.expect({time_alignment_.stamp_sigma_s(), uncertainty_.velocity_sigma_mps(), imu.noise});
+  monitor_.expect({time_alignment_.stamp_sigma_s(), one_camera_ ? uncertainty_.velocity_sigma_mps() : 0, imu.noise});
   const Monitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
                                                   predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {

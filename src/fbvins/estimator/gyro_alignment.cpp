@@ -23,6 +23,8 @@ constexpr Duration kRateOver{8'000'000};
 constexpr Duration kMargin = Duration{static_cast<std::int64_t>(1e9 * GyroAlignment::kLargestOffset_s)} + kRateOver;
 constexpr int kIterations = 6;
 constexpr double kHuber_sigmas = 2;
+/// A track nearer to the direction of the translation than this angle counts as if it were as far, rad.
+constexpr double kEpipole = 0.1;
 /// Offsets from which the search begins: closer together than a quarter of the fastest motion of a hand, 5 Hz.
 constexpr double kStarts_s[] = {0, -0.04, 0.04, -0.08, 0.08};
 /// From here on the minimum is known.
@@ -149,14 +151,17 @@ void GyroAlignment::add_pair(const Pair& pair, const Vec8& x, Normal& out) const
   const Mat3 R = (raw * so3_exp(Vec3(by_bias * bias))).toRotationMatrix();
   const Mat3 M = so3_exp(mounting).toRotationMatrix();
   std::vector<Vec3> a, b, n;
-  Mat3 spread = Mat3::Zero();
+  Mat3 spread = Mat3::Zero(), by_noise = 1e-6 * Mat3::Identity();
   for (const Plane& p : pair.planes) {
     a.push_back(so3_exp(Vec3(line_delay_s * p.rows_a * rate_a)) * (M * p.a));
     b.push_back(so3_exp(Vec3(line_delay_s * p.rows_b * rate_b)) * (M * p.b));
     n.push_back(a.back().cross(R * b.back()) / p.sigma);
-    spread += n.back() * n.back().transpose() / std::max(1.0, n.back().squaredNorm() / 25);
+    const double weight = 1 / std::max(1.0, n.back().squaredNorm() / 25);
+    spread += weight * n.back() * n.back().transpose();
+    by_noise += weight * (Mat3::Identity() - a.back() * a.back().transpose());
   }
-  const Vec3 t = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors().col(0);
+  // The least share of what noise would spread the normals by, and not the least spread, which is always along the view.
+  const Vec3 t = Eigen::GeneralizedSelfAdjointEigenSolver<Mat3>(spread, by_noise).eigenvectors().col(0).normalized();
   const Vec3 e = t.unitOrthogonal(), f = t.cross(e);
   Eigen::Matrix<double, 3, 8> turn;  // of R by the unknowns
   turn << by_bias, rate_b - R.transpose() * rate_a, Vec3::Zero(), Mat3::Identity() - R.transpose();
@@ -167,12 +172,13 @@ void GyroAlignment::add_pair(const Pair& pair, const Vec8& x, Normal& out) const
   Vec2 X_late = Vec2::Zero();
   for (std::size_t k = 0; k < a.size(); ++k) {
     const Plane& p = pair.planes[k];
-    const double r = t.dot(n[k]);
+    const double to_plane = p.sigma * std::max(kEpipole, t.cross(a[k]).norm());
+    const double r = t.dot(n[k]) * p.sigma / to_plane;
     const RobustValue robust = huber(r * r, kHuber_sigmas);
-    Vec8 J = (-(t.cross(a[k])).transpose() * R * hat(b[k]) * turn / p.sigma).transpose();
-    J(4) += (t.dot(p.rows_a * rate_a.cross(a[k]).cross(R * b[k])) + t.dot(a[k].cross(R * (p.rows_b * rate_b.cross(b[k]))))) / p.sigma;
-    const double J_late = -t.cross(a[k]).dot(R * b[k].cross(rate_b)) / p.sigma;
-    const Vec2 d(e.dot(n[k]), f.dot(n[k]));
+    Vec8 J = (-(t.cross(a[k])).transpose() * R * hat(b[k]) * turn / to_plane).transpose();
+    J(4) += (t.dot(p.rows_a * rate_a.cross(a[k]).cross(R * b[k])) + t.dot(a[k].cross(R * (p.rows_b * rate_b.cross(b[k]))))) / to_plane;
+    const double J_late = -t.cross(a[k]).dot(R * b[k].cross(rate_b)) / to_plane;
+    const Vec2 d = p.sigma / to_plane * Vec2(e.dot(n[k]), f.dot(n[k]));
     H_late += robust.weight * J_late * J_late, g_late += robust.weight * r * J_late, X_late += robust.weight * J_late * d;
     out.H += robust.weight * J * J.transpose(), out.g += robust.weight * r * J;
     V += robust.weight * d * d.transpose(), w += robust.weight * r * d;

@@ -22,7 +22,7 @@ class TimeAlignment {
   /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight.
   bool add(const TrackedFrame& frame, bool running);
   /// Whether enough was seen to notice an offset that would spoil a start in motion.
-  bool known() const { return !enabled_ || alignment_.pairs() >= kFewestForStart; }
+  bool known() const { return !enabled_ || alignment_.pairs() >= kFewestForStart || frames_ >= kLongestWait; }
   Duration correction() const { return correction_; }
   /// What the line delay of the rig's shutters is corrected by.
   double line_delay_correction_s() const { return line_delay_s_; }
@@ -32,6 +32,8 @@ class TimeAlignment {
  private:
   /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
   static constexpr int kFewestForStart = 8;
+  /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
+  static constexpr int kLongestWait = 40;
   void solve();
 
   bool enabled_;
