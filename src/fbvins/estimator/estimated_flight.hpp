@@ -21,7 +21,8 @@ namespace fbvins::test {
 
 inline EstimatorOptions exact_noise() {
   EstimatorOptions o;  // the simulated IMU has the calibrated noise
-  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
+  o.gyro_unmodelled_radps_rthz = o.accel_unmodelled_mps2_rthz = 0;
+  o.gyro_walk_scale = o.accel_walk_scale = 1;
   return o;
 }
 

@@ -42,7 +42,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibration_(calibrated_),
       one_camera_(!has_stereo(rig)),
       uncertainty_(scale_sigma_of(rig), one_camera_, options.gravity_mps2),
-      time_alignment_(rig, options.align_time_offset),
+      time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset),
       exposures_(rig),
       surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),

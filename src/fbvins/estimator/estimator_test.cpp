@@ -27,14 +27,14 @@ TEST(Estimator, FollowsAMotionThatNeverRests) {
   const EstimatedFlight flown = fly(flight, 200);
   const int first = flown.first_pose();
   ASSERT_GE(first, 0);
-  EXPECT_LT(first, 20);
+  EXPECT_LT(first, 28) << "the time offset is looked for first";
   for (int k = first; k < 200; ++k) {
     EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::good, HealthReason::none})) << k;
     EXPECT_LT(flown.position_error(k), 0.04) << k;
   }
   const Odometry& last = flown.odometry.back();
   EXPECT_LT((last.bias.gyro_radps - flight.bias.gyro_radps).norm(), 2e-3);
-  EXPECT_LT((last.bias.accel_mps2 - flight.bias.accel_mps2).norm(), 0.05);
+  EXPECT_LT((last.bias.accel_mps2 - flight.bias.accel_mps2).norm(), 0.08);
   EXPECT_LT((last.v_WB - flown.truth_in_W(199).v_FB).norm(), 0.05);
 }
 
@@ -253,7 +253,7 @@ TEST(Estimator, ACorrectionWithoutTroubleIsMadeInStepsAndThePoseIsNotGoodMeanwhi
     return told;
   };
   EXPECT_EQ(told_with(0.1).owed, 0);
-  const Told steps = told_with(0.007), at_once = told_with(0.003);
+  const Told steps = told_with(0.01), at_once = told_with(0.003);
   EXPECT_GT(steps.owed, 0);
   EXPECT_EQ(steps.resets, 0);
   EXPECT_GT(at_once.resets, 0);

@@ -103,7 +103,8 @@ TEST(Level, IsReportedWhenTheTiltIsKnown) {
   SimulatedFlight flight(Motion(0.6, 0.5), 34);
   flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
   EstimatorOptions exact;  // the simulated IMU has the calibrated noise
-  exact.gyro_noise_scale = exact.accel_noise_scale = exact.gyro_walk_scale = exact.accel_walk_scale = 1;
+  exact.gyro_unmodelled_radps_rthz = exact.accel_unmodelled_mps2_rthz = 0;
+  exact.gyro_walk_scale = exact.accel_walk_scale = 1;
   Estimator estimator(flight.rig, exact);
   bool was_level = false;
   int unknown = 0;

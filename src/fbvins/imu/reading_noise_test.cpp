@@ -44,14 +44,45 @@ struct Flown {
   }
 };
 
-TEST(ReadingNoise, MotionAndUsualVibrationAreNotNoise) {
+/// Readings at rest that are noisier than the sensor's own noise by white noise of these sizes.
+ImuNoiseScale at_rest_with(double gyro_radps, double accel_mps2) {
+  Rng rng(3);
+  ReadingNoise noise(assumed());
+  ImuNoiseScale out;
+  for (int first = 0; first < 400; first += 10) {
+    ImuSegment segment;
+    for (int k = first; k <= first + 10; ++k)
+      segment.samples.push_back({Time{} + Duration::from_seconds(0.005 * k), gyro_radps * Vec3(rng.normal(), rng.normal(), rng.normal()),
+                                 Vec3(0, 0, 9.81) + accel_mps2 * Vec3(rng.normal(), rng.normal(), rng.normal())});
+    out = noise.of(segment);
+  }
+  return out;
+}
+
+TEST(ReadingNoise, VibrationIsAddedInQuadrature) {
+  const ImuNoise own = assumed();
+  const double root_rate = std::sqrt(own.rate_hz);
+  const ImuNoiseScale shaken = at_rest_with(0.1, 4);
+  EXPECT_NEAR(shaken.gyro, std::hypot(1, 0.25 * 0.1 / root_rate / own.gyro_noise_density_radps_rthz), 0.8);
+  EXPECT_NEAR(shaken.accel, std::hypot(1, 4 / root_rate / own.accel_noise_density_mps2_rthz), 1.2);
+}
+
+TEST(ReadingNoise, ADeclaredNoiseOfTenTimesTheRealOneCountsLess) {
+  const double root_rate = std::sqrt(assumed().rate_hz);
+  const ImuNoiseScale calm = at_rest_with(0.1 * assumed().gyro_noise_density_radps_rthz * root_rate,
+                                          0.1 * assumed().accel_noise_density_mps2_rthz * root_rate);
+  EXPECT_NEAR(calm.gyro, 0.3, 0.08);
+  EXPECT_NEAR(calm.accel, 0.3, 0.08);
+}
+
+TEST(ReadingNoise, MotionIsNotVibration) {
   Rng rng(1);
   const Flown flown([&](int, ImuSample& s) {
     s.gyro_radps += 0.04 * Vec3(rng.normal(), rng.normal(), rng.normal());
     s.accel_mps2 += 1.2 * Vec3(rng.normal(), rng.normal(), rng.normal());
   });
-  EXPECT_EQ(flown.largest_gyro, 1);
-  EXPECT_EQ(flown.newest.accel, 1);
+  EXPECT_LT(flown.largest_gyro, 2.5);
+  EXPECT_LT(flown.newest.accel, 2.5);
   EXPECT_NEAR(flown.noise.gyro_vibration_radps(), 0.04, 0.01);
   EXPECT_NEAR(flown.noise.accel_vibration_mps2(), 1.2, 0.3);
   EXPECT_EQ(flown.clipped, 0);
@@ -63,8 +94,8 @@ TEST(ReadingNoise, StrongVibrationCountsAsOftenAsItIsStronger) {
     s.gyro_radps += 0.28 * Vec3(rng.normal(), rng.normal(), rng.normal());
     s.accel_mps2 += 9 * Vec3(rng.normal(), rng.normal(), rng.normal());
   });
-  EXPECT_NEAR(flown.newest.gyro, 4, 1);
-  EXPECT_NEAR(flown.newest.accel, 3, 0.8);
+  EXPECT_NEAR(flown.newest.gyro, 0.25 * 0.28 / std::sqrt(200) / 4e-4, 3);
+  EXPECT_NEAR(flown.newest.accel, 9 / std::sqrt(200) / 0.048, 3);
 }
 
 TEST(ReadingNoise, AWrongReadingCountsInItsSegment) {
@@ -75,7 +106,7 @@ TEST(ReadingNoise, AWrongReadingCountsInItsSegment) {
   const double turned = flown.largest_gyro * assumed().gyro_noise_density_radps_rthz * std::sqrt(0.05);
   EXPECT_GT(turned, 0.012);
   EXPECT_LT(turned, 0.03);
-  EXPECT_EQ(flown.newest.gyro, 1) << "half a second later";
+  EXPECT_LE(flown.newest.gyro, 1) << "half a second later";
 }
 
 TEST(ReadingNoise, AnAxisAtTheEndOfItsRangeMayBeWrongByAsMuchAgain) {
@@ -87,7 +118,14 @@ TEST(ReadingNoise, AnAxisAtTheEndOfItsRangeMayBeWrongByAsMuchAgain) {
 TEST(ReadingNoise, EqualNumbersAtRestAreNotTheEndOfARange) {
   const Flown flown([](int, ImuSample& s) { s.gyro_radps = Vec3(0.01, 0, -0.02), s.accel_mps2 = Vec3(0.1, 0, 9.81); });
   EXPECT_EQ(flown.clipped, 0);
-  EXPECT_EQ(flown.largest_gyro, 1);
+  EXPECT_LE(flown.largest_gyro, 1);
+}
+
+TEST(ReadingNoise, RepeatedReadingsAreNotTheEndOfARange) {
+  const Flown flown([](int k, ImuSample& s) {
+    if (k % 20 < 6) s.gyro_radps = Vec3(0.6, 0.2, 0.1 * (k / 20)), s.accel_mps2 = Vec3(1, 2, 9);
+  });
+  EXPECT_EQ(flown.clipped, 0);
 }
 
 TEST(ReadingNoise, AfterAGapItBeginsAnew) {
@@ -97,9 +135,9 @@ TEST(ReadingNoise, AfterAGapItBeginsAnew) {
     before.samples.push_back({Time{} + Duration::from_seconds(0.005 * k), Vec3::Zero(), Vec3(0, 0, 9.81)});
     after.samples.push_back({Time{} + Duration::from_seconds(1 + 0.005 * k), Vec3(2, -2, 2), Vec3(5, 0, 9)});
   }
-  EXPECT_EQ(noise.of(before).gyro, 1);
-  EXPECT_EQ(noise.of({}).gyro, 1);
-  EXPECT_EQ(noise.of(after).gyro, 1) << "other numbers after a gap are no blow";
+  EXPECT_LE(noise.of(before).gyro, 1);
+  EXPECT_LE(noise.of({}).gyro, 1);
+  EXPECT_LE(noise.of(after).gyro, 1) << "other numbers after a gap are no blow";
 }
 
 }  // namespace reading_noise_test
