@@ -23,11 +23,11 @@ struct Found {
 };
 
 /// Renders the board at random poses and compares what is found with the exact projection.
-Found compare(const Camera& camera, const BoardImageOptions& options, std::uint64_t seed) {
+Found compare(const Camera& camera, int border, const BoardImageOptions& options, std::uint64_t seed) {
   Found out;
   Rng rng(seed);
   const SimulatedRig rig{{camera}, {{}}};
-  const BoardCamera renderer(camera, *BoardPattern::create(kBoard));
+  const BoardCamera renderer(camera, *BoardPattern::create(kBoard, border));
   BoardDetector detector = *BoardDetector::create(kBoard);
   Vec2 sum = Vec2::Zero();
   for (int i = 0; i < 2; ++i) {
@@ -51,16 +51,20 @@ Found compare(const Camera& camera, const BoardImageOptions& options, std::uint6
 }
 
 TEST(BoardDetector, CornersAreFoundToASmallPartOfAPixel) {
-  for (const std::size_t kind : {0u, 1u}) {
-    const Found found = compare(example_cameras()[kind], {}, 5 + kind);
-    EXPECT_GT(found.corners, 0.5 * found.visible) << kind;
-    EXPECT_LT(found.rms_px, 0.04) << kind;
-    EXPECT_LT(found.bias_px, 0.02) << kind;
-  }
+  for (const int border : {kLibraryBorder, kKalibrBorder})
+    for (const std::size_t kind : {0u, 1u}) {
+      const Found found = compare(example_cameras()[kind], border, {}, 5 + kind);
+      // Cells of two pixels, which Kalibr's tags have here in the fisheye's images, are not always read.
+      EXPECT_GT(found.corners, (kind == 1 && border == kKalibrBorder ? 0.2 : 0.5) * found.visible) << kind << ", border " << border;
+      EXPECT_LT(found.rms_px, 0.04) << kind << ", border " << border;
+      EXPECT_LT(found.bias_px, 0.02) << kind << ", border " << border;
+    }
 }
 
-TEST(BoardDetector, WhatIsPrintedIsWhatIsFound) {
-  const auto page = draw_target(kBoard, "A0");
+class PrintedBoard : public ::testing::TestWithParam<int> {};
+
+TEST_P(PrintedBoard, IsWhatIsFound) {
+  const auto page = draw_target(kBoard, "A0", GetParam());
   ASSERT_TRUE(page) << page.error().message;
   constexpr double kPixels = 1;  // a millimetre
   Image image(static_cast<int>(page->width_mm * kPixels), static_cast<int>(page->height_mm * kPixels), 255);
@@ -84,6 +88,8 @@ TEST(BoardDetector, WhatIsPrintedIsWhatIsFound) {
   EXPECT_EQ(detector.find(mirrored.view()).tags, 0);
   EXPECT_TRUE(detector.finds_mirrored(mirrored.view()));
 }
+
+INSTANTIATE_TEST_SUITE_P(OfBothBorders, PrintedBoard, ::testing::Values(kLibraryBorder, kKalibrBorder));
 
 TEST(BoardDetector, TagsOfOtherBoardsAndDoubleTagsAreCounted) {
   const SimulatedRig rig{{example_cameras()[0]}, {{}}};
