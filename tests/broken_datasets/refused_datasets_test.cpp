@@ -114,9 +114,10 @@ const Refused kRefused[] = {
     {"ResolutionWord", [](Files& f) { replace(f["cam0/sensor.yaml"], "[64, 48]", "big"); },
      "/mav0/cam0/sensor.yaml:12: resolution: is not a list of numbers"},
     {"DistortionUnknown", [](Files& f) { replace(f["cam0/sensor.yaml"], "radial-tangential", "fov"); },
-     "/mav0/cam0/sensor.yaml:15: distortion_model: 'fov' is not supported, only radial-tangential, radtan, equidistant and none"},
-    {"DistortionTooLong", [](Files& f) { replace(f["cam0/sensor.yaml"], "-0.0002]", "-0.0002, 0.5]"); },
-     "/mav0/cam0/sensor.yaml:16: distortion_coefficients: has 5 numbers where 4 are needed"},
+     "/mav0/cam0/sensor.yaml:15: distortion_model: 'fov' is not supported, only radtan (plumb_bob, rational_polynomial), equidistant "
+     "(fisheye) and none"},
+    {"DistortionTooLong", [](Files& f) { replace(f["cam0/sensor.yaml"], "-0.0002]", "-0.0002, 0.5, 0.1]"); },
+     "/mav0/cam0/sensor.yaml:16: distortion_coefficients: has 6 numbers where 4, 5, 8, 12 or 14 are known"},
     {"DistortionOfAnotherModel",
      [](Files& f) { replace(f["cam0/sensor.yaml"], "pinhole\nintrinsics: [", "eucm\nintrinsics: [0.6, 1.1, "); },
      "/mav0/cam0/sensor.yaml:15: distortion_model: 'radial-tangential' is not supported, only none"},

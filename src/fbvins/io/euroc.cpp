@@ -13,6 +13,7 @@
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -150,6 +151,12 @@ class EurocReader {
     const auto& path = options_.kalibr_imu;
     Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path), imu.noise);
     if (!rig) return rig.error();
+    std::vector<std::string> folders;
+    for (int i = 0; i < rig->camera_count(); ++i) folders.push_back(fmt::format("cam{}", i));
+    if (const auto order = order_by_topics(rostopics_of(options_.kalibr_camchain), folders); !order.empty()) {
+      warn(order_sentence(options_.kalibr_camchain, order));
+      rig = in_order(*rig, order);
+    }
     take(*rig);
     return {};
   }
