@@ -74,6 +74,16 @@ UnifiedRadtan bent(const UnifiedRadtan&, const std::vector<double>& v) {
   return {v[0] * e, v[1] * e, v[2], v[3], v[4], k1 * e * e, k2 * std::pow(e, 4), v[7] * e, v[8] * e};
 }
 
+/// The series of N/D in place of N: the coefficients of both trade off against one another.
+std::vector<double> straightened(const PinholeRational& m) {
+  const double c1 = m.k1 - m.k4, c2 = m.k2 - m.k5 - m.k4 * c1, c3 = m.k3 - m.k6 - m.k5 * c1 - m.k4 * c2;
+  return {m.fx, m.fy, m.cx, m.cy, c1, c2, m.p1, m.p2, c3, m.k4, m.k5, m.k6};
+}
+PinholeRational bent(const PinholeRational&, const std::vector<double>& v) {
+  const double c1 = v[4], c2 = v[5], c3 = v[8], k4 = v[9], k5 = v[10], k6 = v[11];
+  return {v[0], v[1], v[2], v[3], c1 + k4, c2 + k5 + k4 * c1, v[6], v[7], c3 + k6 + k5 * c1 + k4 * c2, k4, k5, k6};
+}
+
 template <class Model>
 std::vector<double> straightened(const Model& m) {
   std::vector<double> out;

@@ -36,7 +36,8 @@ struct Figure {
 
 std::vector<std::string> calibration_doubts(const StereoRig& rig) {
   std::vector<std::string> out;
-  for (int i = 0; i < rig.camera_count(); ++i) doubt_times(rig, i, out);
+  for (int i = 0; i < rig.camera_count(); ++i)
+    if (i == 0 || rig.camera(i).own_times() != CameraTimes{}) doubt_times(rig, i, out);
   const ImuNoise& n = rig.imu_noise;
   // From the best sensor that flies to the worst, with the factor of ten that many add.
   const Figure figures[] = {{"gyroscope's noise density", n.gyro_noise_density_radps_rthz, 1e-6, 0.05},

@@ -33,9 +33,8 @@ TEST(CalibrationDoubts, OtherUnitsAreAskedAbout) {
   EXPECT_NE(doubt(r).find("camera 1's time offset is -4.5 s: is it in milliseconds"), std::string::npos) << doubt(r);
   r = rig();
   r.line_delay_s = -3e-5;
-  EXPECT_EQ(calibration_doubts(r).size(), 2u);
-  EXPECT_NE(calibration_doubts(r)[0].find("line delay is negative"), std::string::npos);
-  r = with_one_camera(rig());
+  EXPECT_NE(doubt(r).find("camera 0's line delay is negative"), std::string::npos) << "once for all that have it";
+  r = rig();
   r.line_delay_s = 35;
   EXPECT_NE(doubt(r).find("is it in microseconds"), std::string::npos) << doubt(r);
   for (const double factor : {1e-3, 1e3}) {
