@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "fbvins/calibration/corner_refine.hpp"
+#include "fbvins/calibration/grid_fill.hpp"
 #include "fbvins/calibration/grid_tags.hpp"
 
 namespace fbvins {
@@ -32,12 +33,19 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
                     board.kind == BoardKind::charuco ? "ChArUco board" : "chessboard")};
   Result<TagDetector> detector = TagDetector::create({kLibraryBorder, kKalibrBorder});
   if (!detector) return detector.error();
-  return BoardDetector(board, *std::move(detector));
+  std::vector<TagCells> all;
+  for (int id = 0; id < board.columns * board.rows; ++id) {
+    const Result<TagCells> cells = tag_cells(id);
+    if (!cells) return cells.error();
+    all.push_back(*cells);
+  }
+  return BoardDetector(board, std::move(all), *std::move(detector));
 }
 
 BoardDetection BoardDetector::find(const ImageView& image) {
   BoardDetection out;
-  const GridTags seen = tags_of_grid(board_, detector_.find(image, board_.columns * board_.rows / 2));
+  GridTags seen = tags_of_grid(board_, detector_.find(image, board_.columns * board_.rows / 2));
+  if (seen.twice == 0) seen.tags = with_missing_tags(board_, cells_, image, std::move(seen.tags));
   out.tags = static_cast<int>(seen.tags.size());
   out.foreign_tags = seen.foreign;
   out.twice = seen.twice;
