@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <string_view>
 
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -22,13 +21,13 @@ std::string_view plain(std::string_view topic) {
   return topic;
 }
 
-bool names(std::string_view rostopic, std::string_view recorded) {
+}  // namespace
+
+bool names_camera(std::string_view rostopic, std::string_view recorded) {
   const std::string_view topic = plain(rostopic), camera = plain(recorded);
   const bool folder = camera.find('/') == std::string_view::npos;
   return topic == camera || (folder && topic.substr(0, topic.find('/')) == camera);
 }
-
-}  // namespace
 
 std::vector<std::string> rostopics_of(const std::string& camchain_path) {
   const Result<std::string> text = read_file(camchain_path, kLargestYaml_bytes);
@@ -47,7 +46,7 @@ std::vector<std::string> rostopics_of(const std::string& camchain_path) {
 std::vector<int> order_by_topics(const std::vector<std::string>& rostopics, const std::vector<std::string>& recorded) {
   std::vector<int> order;
   for (const std::string& camera : recorded) {
-    const auto found = std::ranges::find_if(rostopics, [&](const std::string& topic) { return names(topic, camera); });
+    const auto found = std::ranges::find_if(rostopics, [&](const std::string& topic) { return names_camera(topic, camera); });
     const auto number = static_cast<int>(found - rostopics.begin());
     if (found == rostopics.end() || std::ranges::find(order, number) != order.end()) return {};
     order.push_back(number);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
@@ -11,6 +12,9 @@ namespace fbvins {
 
 /// The `rostopic` of each camera of a chain; empty where the file cannot be read, or one has none.
 std::vector<std::string> rostopics_of(const std::string& camchain_path);
+
+/// Whether a `rostopic` is that of a recorded camera, by its topic or by the name of its folder (cam0).
+bool names_camera(std::string_view rostopic, std::string_view recorded);
 
 /// For each recorded camera, by its topic or by the name of its folder (cam0), the number of the chain's camera; empty where the
 /// topics do not name all of them, or say what the numbers say.

@@ -54,7 +54,7 @@ Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optio
                               const ImuNoise& otherwise) {
   Result<std::string> camchain = read_file(camchain_path, kLargestYaml_bytes);
   if (!camchain) return camchain.error();
-  if (const std::string other = camchain->find("cam0") == std::string::npos ? foreign_file(*camchain) : ""; !other.empty())
+  if (const std::string other = camchain->find("cam0:") == std::string::npos ? foreign_file(*camchain) : ""; !other.empty())
     return Error{ErrorCode::unsupported, fmt::format("{}: {}", camchain_path, other)};
   Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *camchain}, files_beside(camchain_path));
   if (!rig) return rig;
