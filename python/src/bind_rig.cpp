@@ -32,7 +32,8 @@ Camera make_camera(int width, int height, double fx, double fy, double cx, doubl
   const auto known = kModels.find(model);
   if (known == kModels.end())
     throw nb::value_error(
-        fmt::format("model: 'radtan', 'radtan5', 'rational', 'equidistant', 'ds', 'eucm' or 'omni' is expected, not '{}'", model).c_str());
+        fmt::format("model: 'radtan', 'radtan5', 'rational', 'equidistant', 'ds', 'eucm' or 'omni' is expected, not '{}'", model)
+            .c_str());
   const auto& [name, count] = known->second;
   const std::vector<double> k = distortion.empty() && count == 4 ? std::vector<double>(4, 0.0) : distortion;
   if (k.size() != count)

@@ -40,7 +40,8 @@ struct UnifiedRadtan {
   double xi = 0, k1 = 0, k2 = 0, p1 = 0, p2 = 0;
 };
 
-/// Pinhole with a third radial coefficient, ROS's "plumb_bob": n (1 + k1 s + k2 s^2 + k3 s^3) and PinholeRadtan's tangential part.
+/// Pinhole with a third radial coefficient, ROS's "plumb_bob": n (1 + k1 s + k2 s^2 + k3 s^3) and PinholeRadtan's tangential
+/// part.
 struct PinholeRadtan5 {
   double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;

@@ -129,8 +129,9 @@ std::string rectified_topics(const BagContents& contents, const ChosenTopics& to
   for (const std::string& topic : topics.cameras) {
     const BagCamera* camera = camera_for(contents, topic);
     const auto* rectified = camera ? rectified_of(*camera, topic) : nullptr;
-    if (rectified && (!rectified->R_rectified_raw.isIdentity(0) || camera->camera.intrinsics() != rectified->camera.intrinsics() ||
-                      camera->camera.distortion() != rectified->camera.distortion()))
+    if (rectified &&
+        (!rectified->R_rectified_raw.isIdentity(0) || camera->camera.intrinsics() != rectified->camera.intrinsics() ||
+         camera->camera.distortion() != rectified->camera.distortion()))
       said.push_back(printable(topic));
   }
   if (said.empty()) return "";

@@ -197,16 +197,17 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
   const DistortionKind kind = model.empty() ? DistortionKind::brown : distortion_kind(model);
   const bool straight = is_straight(model, d) || kind == DistortionKind::none;
   if (!straight && kind == DistortionKind::unknown)
-    return Error{ErrorCode::unsupported,
-                 fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob, rational_polynomial and equidistant "
-                             "are known",
-                             fbvins::quoted(model), d.size())};
+    return Error{
+        ErrorCode::unsupported,
+        fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob, rational_polynomial and equidistant "
+                    "are known",
+                    fbvins::quoted(model), d.size())};
   const Result<Camera> camera = straight                              ? opencv_camera(f, {}, w, h)
                                 : kind == DistortionKind::equidistant ? fisheye_camera(f, d, w, h)
                                                                       : opencv_camera(f, d, w, h);
   if (camera) return as_recorded({*camera, frame}, tail);
-  return Error{camera.error().code, fmt::format("a camera of the model '{}': its distortion {}", fbvins::quoted(model),
-                                                camera.error().message)};
+  return Error{camera.error().code,
+               fmt::format("a camera of the model '{}': its distortion {}", fbvins::quoted(model), camera.error().message)};
 }
 
 std::optional<BagTransform> transform_of(std::string_view bytes, Encoding encoding) {

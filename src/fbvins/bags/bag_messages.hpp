@@ -37,8 +37,8 @@ std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding e
 struct BagCamera {
   Camera camera;
   std::string frame;
-  /// By R and P, what image_proc makes of its images: a camera without distortion, turned. None where it would be the same camera,
-  /// or the message has no P.
+  /// By R and P, what image_proc makes of its images: a camera without distortion, turned. None where it would be the same
+  /// camera, or the message has no P.
   struct Rectified {
     Camera camera;
     Mat3 R_rectified_raw = Mat3::Identity();

@@ -69,7 +69,8 @@ Result<StereoRig> load_kimera(const std::string& path) {
     return YamlReader(name, *text);
   };
   std::error_code ignored;
-  const fs::path left = folder / "LeftCameraParams.yaml", right = folder / "RightCameraParams.yaml", noise = folder / "ImuParams.yaml";
+  const fs::path left = folder / "LeftCameraParams.yaml", right = folder / "RightCameraParams.yaml",
+                 noise = folder / "ImuParams.yaml";
   const bool known = fs::exists(left, ignored);
   for (const fs::path& name : {known ? left : fs::path(path), right}) {
     if (!cameras.empty() && (!known || !fs::exists(name, ignored))) break;

@@ -17,8 +17,9 @@ namespace fbvins {
 
 /// Kalibr's camchain-imucam.yaml; OpenVINS's estimator_config.yaml or kalibr_imucam_chain.yaml; Basalt's calibration.json;
 /// VINS-Fusion's configuration with its two camera files; VINS-Mono's and ORB-SLAM3's configurations; an OAK's JSON; Kimera-VIO's
-/// LeftCameraParams.yaml with the files beside it; an EuRoC folder with its sensor.yaml files. `imu_path`: noise figures as Kalibr
-/// writes them, with the IMU's place (kalibr_imu.hpp), or imu_utils; without it they are the file's own, where it has any. An error for a camera model that is not known.
+/// LeftCameraParams.yaml with the files beside it; an EuRoC folder with its sensor.yaml files. `imu_path`: noise figures as
+/// Kalibr writes them, with the IMU's place (kalibr_imu.hpp), or imu_utils; without it they are the file's own, where it has any.
+/// An error for a camera model that is not known.
 Result<StereoRig> load_calibration(const std::string& path, const std::string& imu_path = "");
 
 /// Two files of ROS's camera calibration (camera_info). They have the stereo extrinsics, but not those of the IMU: these are

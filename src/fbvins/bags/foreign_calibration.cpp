@@ -218,15 +218,17 @@ Result<StereoRig> parse_vins_mono(YamlReader yaml) {
   const YAML::Node& root = yaml.root();
   const Camera camera = camodocal_camera(yaml);
   if (yaml.ok() && !yaml.has(root, "extrinsicRotation"))
-    yaml.complain(root, "extrinsicRotation",
-                  "is missing: the camera's place on the IMU is not given; take what VINS has estimated, or calibrate with `fbvins calibrate`");
+    yaml.complain(
+        root, "extrinsicRotation",
+        "is missing: the camera's place on the IMU is not given; take what VINS has estimated, or calibrate with `fbvins calibrate`");
   const std::vector<double> r = yaml.numbers(inner(yaml, root, "extrinsicRotation"), "data", 9),
                             p = yaml.numbers(inner(yaml, root, "extrinsicTranslation"), "data", 3);
   if (!yaml.ok()) return yaml.error();
   Mat3 R;
   R << r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8];
   if (const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff(); !(off < 3e-3) || !(R.determinant() > 0))
-    yaml.complain(root, "extrinsicRotation", fmt::format("is not a rotation: its columns are not of length 1 and orthogonal by up to {:.2g}", off));
+    yaml.complain(root, "extrinsicRotation",
+                  fmt::format("is not a rotation: its columns are not of length 1 and orthogonal by up to {:.2g}", off));
   StereoRig rig = with_cameras({}, {{camera, Pose<B, C0>(Quat(R).normalized(), Vec3(p[0], p[1], p[2]))}});
   rig.imu_noise = vins_noise(yaml);
   rig.time_offset_s = yaml.number_between(root, "td", -10, 10, 0);
@@ -257,11 +259,12 @@ Error camera_info_alone(YamlReader yaml) {
   if (!yaml.ok()) return yaml.error();
   const KalibrCamera k = kalibr_camera(ros.camera);
   return {ErrorCode::unsupported,
-          fmt::format("{}: this is a camera_info file of ROS, without the camera's place on the IMU: write it as Kalibr's chain, with "
-                      "T_cam_imu beside camera_model: {}, intrinsics: {}, distortion_model: {}, distortion_coeffs: {}, resolution: "
-                      "[{}, {}]",
-                      yaml.file(), k.model, yaml_list(k.intrinsics), k.distortion, yaml_list(k.coefficients), ros.camera.width(),
-                      ros.camera.height())};
+          fmt::format(
+              "{}: this is a camera_info file of ROS, without the camera's place on the IMU: write it as Kalibr's chain, with "
+              "T_cam_imu beside camera_model: {}, intrinsics: {}, distortion_model: {}, distortion_coeffs: {}, resolution: "
+              "[{}, {}]",
+              yaml.file(), k.model, yaml_list(k.intrinsics), k.distortion, yaml_list(k.coefficients), ros.camera.width(),
+              ros.camera.height())};
 }
 
 Result<StereoRig> parse_kimera(std::vector<YamlReader> files, std::optional<YamlReader> imu_file) {

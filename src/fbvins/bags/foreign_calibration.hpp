@@ -12,7 +12,6 @@
 
 namespace fbvins {
 
-
 /// kalibr_imucam_chain.yaml: Kalibr's, but T_imu_cam takes camera to IMU coordinates. Noise figures stay at their defaults.
 Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read = {});
 

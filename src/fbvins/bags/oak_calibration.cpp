@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The calibration that Luxonis's library stores in an OAK and writes as JSON: centimetres, each camera's place against another one's,
-// the IMU's against one of them.
+// The calibration that Luxonis's library stores in an OAK and writes as JSON: centimetres, each camera's place against another
+// one's, the IMU's against one of them.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -28,7 +28,8 @@ Camera read_lens(YamlReader& yaml, const std::string& name, const std::string& t
   if (yaml.ok() && !(f[0] > 0 && f[1] > 0)) yaml.complain(root, name + ".fx", "the focal lengths are not positive");
   const int width = side("Camera.width"), height = side("Camera.height");
   if (!yaml.ok()) return {};
-  if (type == "KannalaBrandt8") return *fisheye_camera(f, {number("k1"), number("k2"), number("k3"), number("k4")}, width, height);
+  if (type == "KannalaBrandt8")
+    return *fisheye_camera(f, {number("k1"), number("k2"), number("k3"), number("k4")}, width, height);
   if (type == "Rectified") return *opencv_camera(f, {}, width, height);
   return *opencv_camera(f, {if_there("k1"), if_there("k2"), if_there("p1"), if_there("p2"), if_there("k3")}, width, height);
 }
@@ -54,7 +55,8 @@ std::optional<Pose<C0, C0>> second_camera(YamlReader& yaml) {
 
 ImuNoise read_noise(YamlReader& yaml) {
   const auto figure = [&](const char* name) { return yaml.positive(yaml.root(), name); };
-  return {figure("IMU.NoiseGyro"), figure("IMU.NoiseAcc"), figure("IMU.GyroWalk"), figure("IMU.AccWalk"), figure("IMU.Frequency")};
+  return {figure("IMU.NoiseGyro"), figure("IMU.NoiseAcc"), figure("IMU.GyroWalk"), figure("IMU.AccWalk"),
+          figure("IMU.Frequency")};
 }
 
 }  // namespace
@@ -65,12 +67,16 @@ Result<StereoRig> parse_orbslam(YamlReader yaml) {
   if (yaml.ok() && type != "PinHole" && type != "KannalaBrandt8" && type != "Rectified")
     yaml.complain(root, "Camera.type", fmt::format("'{}' is not supported, only PinHole, KannalaBrandt8 and Rectified", type));
   if (yaml.has(root, "LEFT.K"))
-    yaml.complain(root, "LEFT.K", "of ORB-SLAM's older stereo files is not read: write the cameras as Kalibr's chain, or in its newer form (Camera1.fx)");
+    yaml.complain(
+        root, "LEFT.K",
+        "of ORB-SLAM's older stereo files is not read: write the cameras as Kalibr's chain, or in its newer form (Camera1.fx)");
   const bool newer = yaml.has(root, "Camera1.fx");
   const Camera first = read_lens(yaml, newer ? "Camera1" : "Camera", type);
   if (!yaml.ok()) return yaml.error();
   const auto T_BC0 = read_matrix<B, C0>(yaml, {"IMU.T_b_c1", "Tbc"});
-  if (!T_BC0) yaml.complain(root, newer ? "IMU.T_b_c1" : "Tbc", "is missing: the camera's place on the IMU; calibrate with `fbvins calibrate`, or add it");
+  if (!T_BC0)
+    yaml.complain(root, newer ? "IMU.T_b_c1" : "Tbc",
+                  "is missing: the camera's place on the IMU; calibrate with `fbvins calibrate`, or add it");
   if (!yaml.ok()) return yaml.error();
   std::vector<MountedCamera> cameras{{first, *T_BC0}};
   if (const auto T_C0C1 = second_camera(yaml)) {

@@ -20,8 +20,8 @@ const Pose<B, C0> kLeft(so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03});
 const Pose<B, C0> kRight = kLeft * Pose<C0, C0>(so3_exp({0.01, 0.02, -0.01}), Vec3(0.11, 0.001, 0.002));
 
 std::string rows(const Mat3& R) {
-  return fmt::format("[{:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}]", R(0, 0), R(0, 1), R(0, 2),
-                     R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2));
+  return fmt::format("[{:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g}]", R(0, 0), R(0, 1),
+                     R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2));
 }
 
 template <class P>
@@ -65,7 +65,8 @@ TEST(OtherCalibrations, VinsMono) {
   EXPECT_NEAR(rolling->line_delay_s, 0.024 / 480, 1e-15);
   EXPECT_NEAR(rolling->time_offset_s, 0.01 + 0.012, 1e-12);
   const std::string unknown = replaced(vins_mono(), "extrinsicRotation", "extrinsicTurn");
-  EXPECT_NE(message(parse_vins_mono({"v.yaml", unknown})).find("extrinsicRotation: is missing: the camera's place"), std::string::npos);
+  EXPECT_NE(message(parse_vins_mono({"v.yaml", unknown})).find("extrinsicRotation: is missing: the camera's place"),
+            std::string::npos);
 }
 
 std::string orbslam() {
@@ -89,30 +90,35 @@ TEST(OtherCalibrations, OrbSlam) {
   EXPECT_EQ(parse_orbslam({"o.yaml", with_k3})->left.model_name(), "pinhole-radtan5");
   EXPECT_NE(message(parse_orbslam({"o.yaml", replaced(orbslam(), "IMU.T_b_c1", "IMU.T")})).find("the camera's place on the IMU"),
             std::string::npos);
-  EXPECT_NE(message(parse_orbslam({"o.yaml", replaced(orbslam(), "PinHole", "Scaramuzza")})).find("'Scaramuzza' is not supported"),
-            std::string::npos);
+  EXPECT_NE(
+      message(parse_orbslam({"o.yaml", replaced(orbslam(), "PinHole", "Scaramuzza")})).find("'Scaramuzza' is not supported"),
+      std::string::npos);
 }
 
 TEST(OtherCalibrations, OrbSlamsOlderFilesOfARectifiedPair) {
   const std::string older =
       "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera.fx: 435.2\nCamera.fy: 435.2\nCamera.cx: 367.4\nCamera.cy: 252.2\nCamera.k1: 0.0\n"
       "Camera.k2: 0.0\nCamera.p1: 0.0\nCamera.p2: 0.0\nCamera.width: 752\nCamera.height: 480\nCamera.bf: 43.52\nTbc: !!opencv-matrix " +
-      matrix(kLeft) + "\nIMU.NoiseGyro: 1.7e-04\nIMU.NoiseAcc: 2.0e-03\nIMU.GyroWalk: 1.9e-05\nIMU.AccWalk: 3.e-03\nIMU.Frequency: 200\n";
+      matrix(kLeft) +
+      "\nIMU.NoiseGyro: 1.7e-04\nIMU.NoiseAcc: 2.0e-03\nIMU.GyroWalk: 1.9e-05\nIMU.AccWalk: 3.e-03\nIMU.Frequency: 200\n";
   const auto rig = parse_orbslam({"o.yaml", older});
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_LT((rig->T_BC1.p - kLeft * Vec3(0.1, 0, 0)).norm(), 1e-12);
-  EXPECT_FALSE(parse_orbslam({"o.yaml", older + "DepthMapFactor: 1000.0\n"})->has_right()) << "a depth camera's bf is no second camera";
+  EXPECT_FALSE(parse_orbslam({"o.yaml", older + "DepthMapFactor: 1000.0\n"})->has_right())
+      << "a depth camera's bf is no second camera";
 }
 
 std::string oak() {
   const auto place = [](const Pose<C0, C0>& T, int to) {
-    return fmt::format(R"({{"rotationMatrix": {}, "translation": {{"x": {:.17g}, "y": {:.17g}, "z": {:.17g}}}, "toCameraSocket": {}}})",
-                       rows(T.R()), 100 * T.p.x(), 100 * T.p.y(), 100 * T.p.z(), to);
+    return fmt::format(
+        R"({{"rotationMatrix": {}, "translation": {{"x": {:.17g}, "y": {:.17g}, "z": {:.17g}}}, "toCameraSocket": {}}})",
+        rows(T.R()), 100 * T.p.x(), 100 * T.p.y(), 100 * T.p.z(), to);
   };
   const auto camera = [&](int socket, const Pose<C0, C0>& T, int to) {
-    return fmt::format(R"([{}, {{"cameraType": 0, "width": 1280, "height": 800, "intrinsicMatrix": [[800, 0, 640], [0, 801, 400], [0, 0, 1]],
+    return fmt::format(
+        R"([{}, {{"cameraType": 0, "width": 1280, "height": 800, "intrinsicMatrix": [[800, 0, 640], [0, 801, 400], [0, 0, 1]],
  "distortionCoeff": [0.52, -2.44, 0.0004, -0.0001, 1.42, 0.4, -2.26, 1.35, 0, 0, 0, 0, 0, 0], "extrinsics": {}}}])",
-                       socket, place(T, to));
+        socket, place(T, to));
   };
   const Pose<C0, C0> T_RL = kRight.inverse() * kLeft, T_AR(so3_exp({0.01, 0, 0}), Vec3(-0.0375, 0, 0));
   const Pose<C0, B> T_AB = T_AR * kRight.inverse();

@@ -184,7 +184,9 @@ bool names_depth(const std::string& topic) {
 }
 
 bool names_rectified(const std::string& topic) {
-  const auto is_letter = [&](std::size_t i) { return i < topic.size() && std::isalpha(static_cast<unsigned char>(topic[i])) != 0; };
+  const auto is_letter = [&](std::size_t i) {
+    return i < topic.size() && std::isalpha(static_cast<unsigned char>(topic[i])) != 0;
+  };
   for (std::size_t at = topic.find("rect"); at != std::string::npos; at = topic.find("rect", at + 1))
     if ((at == 0 || !is_letter(at - 1)) && (!is_letter(at + 4) || topic.compare(at + 4, 5, "ified") == 0)) return true;
   return false;

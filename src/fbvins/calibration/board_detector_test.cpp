@@ -55,7 +55,8 @@ TEST(BoardDetector, CornersAreFoundToASmallPartOfAPixel) {
     for (const std::size_t kind : {0u, 1u}) {
       const Found found = compare(example_cameras()[kind], border, {}, 5 + kind);
       // In one of the fisheye's two images no cell of Kalibr's tags has two pixels.
-      EXPECT_GT(found.corners, (kind == 1 && border == kKalibrBorder ? 0.25 : 0.5) * found.visible) << kind << ", border " << border;
+      EXPECT_GT(found.corners, (kind == 1 && border == kKalibrBorder ? 0.25 : 0.5) * found.visible)
+          << kind << ", border " << border;
       EXPECT_LT(found.rms_px, 0.04) << kind << ", border " << border;
       EXPECT_LT(found.bias_px, 0.02) << kind << ", border " << border;
     }

@@ -184,8 +184,7 @@ Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera) {
       "distortion_model: {}\ndistortion_coefficients:\n  rows: 1\n  cols: {}\n  data: {}\n"
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
       "projection_matrix:\n  rows: 3\n  cols: 4\n  data: {}\n",
-      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}),
-      ros_model, d.size(), yaml_list(d),
+      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}), ros_model, d.size(), yaml_list(d),
       yaml_list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
 }
 

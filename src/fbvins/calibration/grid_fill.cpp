@@ -13,10 +13,10 @@ namespace fbvins {
 namespace {
 
 constexpr int kLeastNeighbours = 2, kMostNeighbours = 5, kGridReach = 2;  ///< tags, and places in the grid between them
-constexpr int kFillRounds = 3;                                           ///< what is found leads to the next
+constexpr int kFillRounds = 3;                                            ///< what is found leads to the next
 constexpr double kSmallestFilled_px = 12, kLargestFillRadius_px = 6;
-constexpr int kLeastTagContrast = 20;   ///< grey values between the border and the gap
-constexpr int kMostWrongCells = 3;   ///< of 36: eleven differ between two tags
+constexpr int kLeastTagContrast = 20;  ///< grey values between the border and the gap
+constexpr int kMostWrongCells = 3;     ///< of 36: eleven differ between two tags
 
 /// From the board's plane to pixels.
 Vec2 mapped(const Mat3& H, const Vec2& at) { return Vec3(H * at.homogeneous()).hnormalized(); }
@@ -48,7 +48,8 @@ std::optional<Mat3> homography(const Board& board, const std::vector<const TagDe
 std::vector<const TagDetection*> nearest(const Board& board, int id, const std::vector<TagDetection>& tags) {
   std::vector<std::pair<int, const TagDetection*>> near;
   for (const TagDetection& tag : tags) {
-    const int columns = std::abs(tag.id % board.columns - id % board.columns), rows = std::abs(tag.id / board.columns - id / board.columns);
+    const int columns = std::abs(tag.id % board.columns - id % board.columns),
+              rows = std::abs(tag.id / board.columns - id / board.columns);
     if (columns <= kGridReach && rows <= kGridReach) near.emplace_back(columns * columns + rows * rows, &tag);
   }
   std::ranges::stable_sort(near, {}, [](const auto& entry) { return entry.first; });
@@ -114,7 +115,8 @@ std::optional<TagDetection> look_for(const Board& board, int id, const TagCells&
   const double border = static_cast<double>(out.border) / cells_across(out.border);
   const double radius_px = std::clamp(side_px * std::min(border, board.spacing), 2.0, kLargestFillRadius_px);
   for (int k = 0; k < 4; ++k) {
-    const auto corner = refine_corner(image, expected[k], expected[(k + 1) % 4] - expected[k], expected[(k + 3) % 4] - expected[k], radius_px);
+    const auto corner =
+        refine_corner(image, expected[k], expected[(k + 1) % 4] - expected[k], expected[(k + 3) % 4] - expected[k], radius_px);
     if (!corner) return std::nullopt;
     out.corners[k] = *corner;
   }

@@ -10,8 +10,8 @@
 
 namespace fbvins {
 
-/// The tags that agree (grid_tags.hpp), and those between and around them whose four corners are crossings of edges and whose cells
-/// are those of their number. `cells`: of each tag of the board.
+/// The tags that agree (grid_tags.hpp), and those between and around them whose four corners are crossings of edges and whose
+/// cells are those of their number. `cells`: of each tag of the board.
 std::vector<TagDetection> with_missing_tags(const Board& board, const std::vector<TagCells>& cells, const ImageView& image,
                                             std::vector<TagDetection> tags);
 

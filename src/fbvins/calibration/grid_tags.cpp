@@ -10,8 +10,8 @@
 namespace fbvins {
 namespace {
 
-/// Tags so many places apart in the grid are compared, and their distance may be wrong by this part of what is expected: less than
-/// the place of a neighbour, more than what perspective and the lens bend.
+/// Tags so many places apart in the grid are compared, and their distance may be wrong by this part of what is expected: less
+/// than the place of a neighbour, more than what perspective and the lens bend.
 constexpr int kFarthest = 3;
 constexpr double kLargestError = 0.3;
 /// A tag's edges against another's: a wrong number usually turns the tag, too.

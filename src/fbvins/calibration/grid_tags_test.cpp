@@ -41,8 +41,8 @@ TEST(GridTags, AWholeBoardAgrees) {
 
 TEST(GridTags, NumbersThatWereReadByLuckAreLeftOut) {
   std::vector<TagDetection> found = read_of(kBoard, kKalibrBorder);
-  found[3].id = 7;                                                                                   // and 7 is there, too
-  std::ranges::rotate(found[5].corners, found[5].corners.begin() + 1);                               // turned
+  found[3].id = 7;                                                                                     // and 7 is there, too
+  std::ranges::rotate(found[5].corners, found[5].corners.begin() + 1);                                 // turned
   for (Vec2& corner : found[10].corners) corner += 1.6 * (found[1].corners[0] - found[0].corners[0]);  // elsewhere
   std::vector<TagDetection> by_luck{found[2], found[6], found[8]};  // with the other border, right and wrong
   for (TagDetection& tag : by_luck) tag.border = kLibraryBorder, tag.wrong_cells = 1;

@@ -190,7 +190,7 @@ LensModel moved_lens(const LensModel& lens, const double* step) {
       lens);
 }
 
-std::vector<std::string> lens_names() { 
+std::vector<std::string> lens_names() {
   return {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan", "pinhole-radtan5", "pinhole-rational"};
 }
 

@@ -60,9 +60,7 @@ struct TagDetector::State {
   State& operator=(const State&) = delete;
 };
 
-Result<TagDetector> TagDetector::create(const std::vector<int>& borders) {
-  return TagDetector(std::make_unique<State>(borders));
-}
+Result<TagDetector> TagDetector::create(const std::vector<int>& borders) { return TagDetector(std::make_unique<State>(borders)); }
 
 namespace {
 

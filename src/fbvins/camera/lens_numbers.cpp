@@ -25,7 +25,7 @@ KalibrCamera kalibr_camera(const Camera& camera) {
   if (name == "ds" || name == "eucm") return {name, joined(2), "none", {}};
   if (name == "omni-radtan") return {"omni", joined(1), "radtan", {k.begin() + 1, k.end()}};
   // The longer ones, which Kalibr does not have, by ROS's names.
-  const char* distortion = name == "pinhole-radtan"    ? "radtan"
+  const char* distortion = name == "pinhole-radtan"     ? "radtan"
                            : name == "pinhole-radtan5"  ? "plumb_bob"
                            : name == "pinhole-rational" ? "rational_polynomial"
                                                         : "equidistant";

@@ -37,7 +37,8 @@ double ignored_px(const Camera& camera, const std::vector<double>& k) {
   double most = 0;
   for (int i = 0; i <= kParts; ++i)
     for (int j = 0; j <= kParts; ++j) {
-      const Vec2 pixel((camera.width() - 1) * static_cast<double>(i) / kParts, (camera.height() - 1) * static_cast<double>(j) / kParts);
+      const Vec2 pixel((camera.width() - 1) * static_cast<double>(i) / kParts,
+                       (camera.height() - 1) * static_cast<double>(j) / kParts);
       const auto n = camera.undistort(pixel);
       if (!n) continue;
       const double s = n->squaredNorm();
@@ -59,7 +60,8 @@ DistortionKind distortion_kind(std::string_view name) {
   if (is({"none", "pinhole", "distortion.none"})) return DistortionKind::none;
   if (is({"radtan", "radialtangential", "plumbbob", "rationalpolynomial", "rational", "brownconrady", "radtan5", "radtan8"}))
     return DistortionKind::brown;
-  if (is({"equidistant", "fisheye", "kannalabrandt", "kannalabrandt4", "kannalabrandt8", "kb4"})) return DistortionKind::equidistant;
+  if (is({"equidistant", "fisheye", "kannalabrandt", "kannalabrandt4", "kannalabrandt8", "kb4"}))
+    return DistortionKind::equidistant;
   return DistortionKind::unknown;
 }
 
@@ -70,11 +72,11 @@ Result<Camera> opencv_camera(const std::array<double, 4>& f, const std::vector<d
   if (!std::ranges::all_of(coefficients, [](double x) { return std::isfinite(x); }))
     return Error{ErrorCode::malformed, "holds something that is not a number"};
   std::vector<double> k = shortest_form(coefficients);
-  const double *own = k.data();
+  const double* own = k.data();
   Camera camera(k.size() == 4   ? LensModel(PinholeRadtan{f[0], f[1], f[2], f[3], own[0], own[1], own[2], own[3]})
                 : k.size() == 5 ? LensModel(PinholeRadtan5{f[0], f[1], f[2], f[3], own[0], own[1], own[2], own[3], own[4]})
-                                : LensModel(PinholeRational{f[0], f[1], f[2], f[3], own[0], own[1], own[2], own[3], own[4], own[5],
-                                                            own[6], own[7]}),
+                                : LensModel(PinholeRational{f[0], f[1], f[2], f[3], own[0], own[1], own[2], own[3], own[4],
+                                                            own[5], own[6], own[7]}),
                 width, height);
   if (k.size() <= kRational) return camera;
   k.resize(kTilted, 0.0);
@@ -90,7 +92,8 @@ Result<Camera> opencv_camera(const std::array<double, 4>& f, const std::vector<d
 
 Result<Camera> fisheye_camera(const std::array<double, 4>& f, const std::vector<double>& coefficients, int width, int height) {
   std::vector<double> k = coefficients;
-  if ((k.size() < 4 && !k.empty()) || !std::all_of(k.begin() + std::min<std::ptrdiff_t>(4, std::ssize(k)), k.end(), [](double x) { return x == 0; }))
+  if ((k.size() < 4 && !k.empty()) ||
+      !std::all_of(k.begin() + std::min<std::ptrdiff_t>(4, std::ssize(k)), k.end(), [](double x) { return x == 0; }))
     return Error{ErrorCode::malformed, fmt::format("has {} numbers where 4 are needed", k.size())};
   k.resize(4, 0.0);
   return Camera(KannalaBrandt{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3]}, width, height);

@@ -17,8 +17,9 @@ namespace fbvins {
 enum class DistortionKind { none, brown, equidistant, unknown };
 DistortionKind distortion_kind(std::string_view name);
 
-/// By 0, 4, 5, 8, 12 or 14 coefficients, with the fewest that say the same: zeros at the end count nothing. An error, one sentence
-/// without the file's name, for another number of them, or where thin prism and tilt move a pixel of the image by more than 0.1 px.
+/// By 0, 4, 5, 8, 12 or 14 coefficients, with the fewest that say the same: zeros at the end count nothing. An error, one
+/// sentence without the file's name, for another number of them, or where thin prism and tilt move a pixel of the image by more
+/// than 0.1 px.
 Result<Camera> opencv_camera(const std::array<double, 4>& intrinsics, const std::vector<double>& coefficients, int width,
                              int height);
 

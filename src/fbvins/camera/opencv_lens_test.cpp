@@ -71,7 +71,8 @@ TEST(OpencvLens, BeyondAPoleThereIsNoRay) {
 }
 
 TEST(OpencvLens, WhatIsWrittenIsReadBack) {
-  for (const std::vector<double>& k : {std::vector<double>{-0.28, 0.07, 1e-4, 2e-5}, {-0.28, 0.07, 1e-4, 2e-5, -0.02}, kRational}) {
+  for (const std::vector<double>& k :
+       {std::vector<double>{-0.28, 0.07, 1e-4, 2e-5}, {-0.28, 0.07, 1e-4, 2e-5, -0.02}, kRational}) {
     const Camera camera = *opencv_camera(kFocal, k, 640, 480);
     const OpencvCoefficients written = opencv_coefficients(camera);
     EXPECT_EQ(opencv_camera(kFocal, written.values, 640, 480)->distortion(), camera.distortion());

@@ -170,7 +170,8 @@ void GyroAlignment::add_pair(const Pair& pair, const Vec8& x, Normal& out) const
     const double r = t.dot(n[k]);
     const RobustValue robust = huber(r * r, kHuber_sigmas);
     Vec8 J = (-(t.cross(a[k])).transpose() * R * hat(b[k]) * turn / p.sigma).transpose();
-    J(4) += (t.dot(p.rows_a * rate_a.cross(a[k]).cross(R * b[k])) + t.dot(a[k].cross(R * (p.rows_b * rate_b.cross(b[k]))))) / p.sigma;
+    J(4) +=
+        (t.dot(p.rows_a * rate_a.cross(a[k]).cross(R * b[k])) + t.dot(a[k].cross(R * (p.rows_b * rate_b.cross(b[k]))))) / p.sigma;
     const double J_late = -t.cross(a[k]).dot(R * b[k].cross(rate_b)) / p.sigma;
     const Vec2 d(e.dot(n[k]), f.dot(n[k]));
     H_late += robust.weight * J_late * J_late, g_late += robust.weight * r * J_late, X_late += robust.weight * J_late * d;

@@ -12,8 +12,8 @@ constexpr double kMeasured_s = 0.25;
 /// hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md) and whose
 /// readings have 2.7e-3 and 0.07.
 constexpr double kGyroShare = 0.25, kAccelShare = 1;
-/// Axes and scale of an accelerometer that is not calibrated are off by this share (IMUs of cameras and phones, by their data sheets);
-/// what they make of a specific force that changes is wrong for as long as a motion lasts.
+/// Axes and scale of an accelerometer that is not calibrated are off by this share (IMUs of cameras and phones, by their data
+/// sheets); what they make of a specific force that changes is wrong for as long as a motion lasts.
 constexpr double kAxes = 0.03, kMotion_s = 0.3, kMean_s = 1;
 /// Readings that differ much less from one another than the calibrated noise says have less; filters in the sensor hide this part.
 constexpr double kHidden = 3;

@@ -18,13 +18,15 @@ void doubt_times(const StereoRig& rig, int number, std::vector<std::string>& out
                               number, times.time_offset_s));
   const double readout_s = times.line_delay_s * rig.camera(number).height();
   if (std::abs(readout_s) > kLongestReadout_s)
-    out.push_back(fmt::format("calibration: camera {}'s line delay of {:g} s makes {:g} s of an image: is it in microseconds, or of "
-                              "the whole image, where seconds a row are meant?",
-                              number, times.line_delay_s, readout_s));
+    out.push_back(
+        fmt::format("calibration: camera {}'s line delay of {:g} s makes {:g} s of an image: is it in microseconds, or of "
+                    "the whole image, where seconds a row are meant?",
+                    number, times.line_delay_s, readout_s));
   else if (times.line_delay_s < 0)
-    out.push_back(fmt::format("calibration: camera {}'s line delay is negative ({:g} s): rows are taken from the bottom up only where "
-                              "the driver turns the images upside down",
-                              number, times.line_delay_s));
+    out.push_back(
+        fmt::format("calibration: camera {}'s line delay is negative ({:g} s): rows are taken from the bottom up only where "
+                    "the driver turns the images upside down",
+                    number, times.line_delay_s));
 }
 
 struct Figure {
@@ -48,13 +50,15 @@ std::vector<std::string> calibration_doubts(const StereoRig& rig) {
   for (const Figure& f : figures) {
     if (f.value >= f.least && f.value <= f.most) continue;
     plausible = false;
-    out.push_back(fmt::format("calibration: the {} of {:g} is {} than that of any IMU in use ({:g} to {:g}): is it in another unit?",
-                              f.name, f.value, f.value < f.least ? "smaller" : "larger", f.least, f.most));
+    out.push_back(
+        fmt::format("calibration: the {} of {:g} is {} than that of any IMU in use ({:g} to {:g}): is it in another unit?",
+                    f.name, f.value, f.value < f.least ? "smaller" : "larger", f.least, f.most));
   }
   if (plausible && n.gyro_noise_density_radps_rthz > n.accel_noise_density_mps2_rthz)
-    out.push_back(fmt::format("calibration: the gyroscope's noise density ({:g} rad/s/sqrt(Hz)) is larger than the accelerometer's "
-                              "({:g} m/s^2/sqrt(Hz)): are they exchanged?",
-                              n.gyro_noise_density_radps_rthz, n.accel_noise_density_mps2_rthz));
+    out.push_back(
+        fmt::format("calibration: the gyroscope's noise density ({:g} rad/s/sqrt(Hz)) is larger than the accelerometer's "
+                    "({:g} m/s^2/sqrt(Hz)): are they exchanged?",
+                    n.gyro_noise_density_radps_rthz, n.accel_noise_density_mps2_rthz));
   return out;
 }
 

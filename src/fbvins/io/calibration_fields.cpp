@@ -80,8 +80,11 @@ RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, con
   // Hand-typed matrices carry three or four digits.
   constexpr double kTolerance = 3e-3, kExact = 1e-3;
   const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
-  if (!(off < kTolerance)) yaml.complain(map, field, fmt::format("its 3x3 part is not a rotation: its columns are not of length 1 and "
-                                                                 "orthogonal by up to {:.2g}", off));
+  if (!(off < kTolerance))
+    yaml.complain(map, field,
+                  fmt::format("its 3x3 part is not a rotation: its columns are not of length 1 and "
+                              "orthogonal by up to {:.2g}",
+                              off));
   else if (!(R.determinant() > 0)) yaml.complain(map, field, "its 3x3 part is not a rotation, but mirrors");
   else if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) yaml.complain(map, field, "its last row is not 0 0 0 1");
   const Vec3 p(m[3], m[7], m[11]);

@@ -10,10 +10,10 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
-#include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -169,7 +169,8 @@ class EurocReader {
     const auto found = std::ranges::find_if(cameras_, named);
     if (found == cameras_.end() || found == cameras_.begin()) return;
     cameras_ = {*found};
-    warn(fmt::format("{}: its camera is cam{} by its rostopic, which is flown alone", options_.kalibr_camchain, cameras_.front()));
+    warn(
+        fmt::format("{}: its camera is cam{} by its rostopic, which is flown alone", options_.kalibr_camchain, cameras_.front()));
   }
 
   /// A calibration from outside, whose cameras have the numbers of the folders; one of a single camera is that of the first

@@ -21,7 +21,9 @@ struct Kind {
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
-      {{"Gyr:", "Acc:", "avg-axis"}, "the noise of an IMU by imu_utils", "give it by --imu-calibration, beside a calibration of the cameras"},
+      {{"Gyr:", "Acc:", "avg-axis"},
+       "the noise of an IMU by imu_utils",
+       "give it by --imu-calibration, beside a calibration of the cameras"},
       {{"target_type"}, "a board", "give it to `fbvins calibrate` by --target"},
       {{"body_T_cam0"}, "a configuration of VINS-Fusion", kOffline},
       {{"model_type", "projection_parameters", "imu_topic"}, "a configuration of VINS-Mono", kOffline},
@@ -57,14 +59,24 @@ const std::vector<Kind>& kinds() {
       {{"distortion_model", "binning_x"},
        "a camera_info message of ROS, without the camera's place on the IMU",
        "write it as Kalibr's chain, with T_cam_imu"},
-      {{"\"imus\"", "scale_and_alignment"}, "the calibration of a RealSense's IMU", "give it by --imu-calibration, beside a calibration of the cameras"},
+      {{"\"imus\"", "scale_and_alignment"},
+       "the calibration of a RealSense's IMU",
+       "give it by --imu-calibration, beside a calibration of the cameras"},
       {{"\"imus\""}, "the calibration of a RealSense's IMU", "give it by --imu-calibration, beside a calibration of the cameras"},
-      {{"controls-laserpower"}, "a RealSense's settings (a preset), no calibration", "the recording or the device has the calibration, else " "calibrate with `fbvins calibrate`"},
-      {{"\"param-depthunits\""}, "a RealSense's settings (a preset), no calibration", "the recording or the device has the calibration, else " "calibrate with `fbvins calibrate`"},
+      {{"controls-laserpower"},
+       "a RealSense's settings (a preset), no calibration",
+       "the recording or the device has the calibration, else "
+       "calibrate with `fbvins calibrate`"},
+      {{"\"param-depthunits\""},
+       "a RealSense's settings (a preset), no calibration",
+       "the recording or the device has the calibration, else "
+       "calibrate with `fbvins calibrate`"},
       {{"imuToCamera"}, "a calibration of Spectacular AI's SDK", "write its cameras as Kalibr's chain: imuToCamera as T_cam_imu"},
       {{"[LEFT_CAM_"}, "a calibration of a ZED's cameras, without their place on the IMU", kCalibrate},
       {{"config.optical_flow"}, "Basalt's configuration", "give its calibration.json"},
-      {{"gyroscope_noise_density"}, "the noise of an IMU (Kalibr's imu.yaml)", "give it by --imu-calibration, beside a calibration of the cameras"},
+      {{"gyroscope_noise_density"},
+       "the noise of an IMU (Kalibr's imu.yaml)",
+       "give it by --imu-calibration, beside a calibration of the cameras"},
       {{"T_BS", "camera_model"}, "a camera's sensor.yaml of EuRoC", "give the folder that has cam0 and imu0"},
       {{"T_BS", "sensor_type"}, "a sensor.yaml of EuRoC", "give the folder that has cam0 and imu0"},
       {{"M1:", "D1:"}, "OpenCV's calibration of a stereo pair, without its place on the IMU", kCalibrate},
@@ -85,7 +97,8 @@ bool begins_with_dso_model(std::string_view text) {
 }  // namespace
 
 std::string foreign_file(const std::string& text) {
-  if (begins_with_dso_model(text)) return fmt::format("this is a camera's file of DSO or DM-VIO, without its place on the IMU: {}", kAsKalibr);
+  if (begins_with_dso_model(text))
+    return fmt::format("this is a camera's file of DSO or DM-VIO, without its place on the IMU: {}", kAsKalibr);
   for (const Kind& kind : kinds())
     if (std::ranges::all_of(kind.words, [&](std::string_view word) { return text.find(word) != std::string::npos; }))
       return fmt::format("this is {}: {}", kind.what, kind.to_do);

@@ -74,9 +74,9 @@ StereoRig seen_from(const StereoRig& rig, const ImuPlace& imu) {
   return out;
 }
 
-/// imu_utils: the averages of three axes. Its "white noise" is that of Kalibr's density for the rate of 1 Hz that its older versions
-/// assume; newer ones give it times the root of the rate, which they do not write: the larger figure is the safe one. Its bias
-/// instability stands for the random walk.
+/// imu_utils: the averages of three axes. Its "white noise" is that of Kalibr's density for the rate of 1 Hz that its older
+/// versions assume; newer ones give it times the root of the rate, which they do not write: the larger figure is the safe one.
+/// Its bias instability stands for the random walk.
 ImuNoise imu_utils_noise(YamlReader& yaml) {
   ImuNoise noise;
   const auto figure = [&](const char* sensor, const char* name) {
@@ -91,7 +91,8 @@ ImuNoise imu_utils_noise(YamlReader& yaml) {
 
 }  // namespace
 
-Result<StereoRig> with_imu_text(const StereoRig& rig, const std::string& file, const std::string& text, const std::string& which) {
+Result<StereoRig> with_imu_text(const StereoRig& rig, const std::string& file, const std::string& text,
+                                const std::string& which) {
   YamlReader yaml(file, text);
   if (!yaml.ok()) return yaml.error();
   if (yaml.has(yaml.root(), "Gyr") && yaml.has(yaml.root(), "Acc")) {

@@ -17,7 +17,8 @@ constexpr const char *kHere = "  T_i_b:\n  - [1, 0, 0, 0]\n  - [0, 1, 0, 0]\n  -
 
 StereoRig rig() {
   const Camera camera(PinholeRadtan{400, 400, 320, 240}, 640, 480);
-  StereoRig out = with_cameras({}, {{camera, {so3_exp({0.1, 0.2, 0.3}), Vec3(0.1, 0, 0)}}, {camera, {Quat::Identity(), Vec3(0, 0.1, 0)}}});
+  StereoRig out =
+      with_cameras({}, {{camera, {so3_exp({0.1, 0.2, 0.3}), Vec3(0.1, 0, 0)}}, {camera, {Quat::Identity(), Vec3(0, 0.1, 0)}}});
   out.time_offset_s = 0.01;
   return out;
 }
