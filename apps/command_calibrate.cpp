@@ -294,7 +294,8 @@ int measure_noise(const Arguments& a) {
 void add_solver_options(CLI::App& command, Arguments& a) {
   command
       .add_option("--model", a.models,
-                  "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
+                  "lens: pinhole-radtan, pinhole-radtan5, pinhole-rational, pinhole-equidistant, ds, eucm, omni-radtan or auto; "
+                  "one, or one a camera")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();

@@ -19,7 +19,7 @@ constexpr const char* kExamples =
 
 examples:
   fbvins px4 params -o vision.params                   to load in QGroundControl: Parameters, Tools, Load from file
-  fbvins px4 params --link serial --barometer
+  fbvins px4 params --link serial
   fbvins px4 check udp:127.0.0.1:14580                 reads them from the vehicle, and says what is wrong
   fbvins px4 check serial:/dev/ttyS1:921600 --link serial
 
@@ -77,7 +77,8 @@ void add_px4_command(CLI::App& program, int& exit_code) {
     sub->footer(kExamples);
     sub->add_flag("--gps", arguments->setup.gps, "GPS is fused beside vision");
     sub->add_flag("--compass", arguments->setup.compass, "the vehicle has a compass, and it is used");
-    sub->add_flag("--barometer", arguments->setup.barometer, "the barometer is fused: outdoors, at height");
+    sub->add_flag("--barometer,!--no-barometer", arguments->setup.barometer,
+                  "the barometer is fused beside vision's height, for when vision fails; fused by default");
     sub->add_option("--link", arguments->link, "how the vehicle is connected: its port's parameters, too")
         ->check(CLI::IsMember({"none", "serial", "ethernet"}))
         ->capture_default_str();

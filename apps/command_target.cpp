@@ -28,6 +28,7 @@ struct Arguments {
   std::string kind = "aprilgrid", paper = "A4", out = "target";
   int columns = 6, rows = 6;
   double size_m = 0, spacing = 0;
+  int border = kKalibrBorder;
 };
 
 int make_target(const Arguments& a) {
@@ -39,7 +40,7 @@ int make_target(const Arguments& a) {
   if (board.kind == BoardKind::chessboard) board.spacing = 0;
   board.size_m = a.size_m > 0 ? a.size_m : largest_size_m(board, a.paper);
   if (!(board.size_m > 0)) return fail(fmt::format("{} x {} are too many for {}", a.columns, a.rows, a.paper));
-  const Result<Drawing> page = draw_target(board, a.paper);
+  const Result<Drawing> page = draw_target(board, a.paper, a.border);
   if (!page) return fail(page.error().message);
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::path(a.out).parent_path();
@@ -69,6 +70,11 @@ void add_target_command(CLI::App& program, int& exit_code) {
   command->add_option("--size", a->size_m, "edge of a tag or square, m; left out: as large as fits")->check(CLI::PositiveNumber);
   command->add_option("--spacing", a->spacing, "aprilgrid: gap between tags, charuco: marker, as a part of --size (0.3, 0.75)")
       ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--border", a->border,
+                   "aprilgrid: black cells around the pattern of a tag; 2 as Kalibr's boards have, 1 as libapriltag's tags")
+      ->check(CLI::IsMember({kLibraryBorder, kKalibrBorder}))
+      ->capture_default_str();
   command->add_option("--paper", a->paper, "A4, A3, A2, A1 or A0")->capture_default_str();
   command->add_option("--out", a->out, "name of the files, without .pdf")->capture_default_str();
   command->callback([a, &exit_code] { exit_code = make_target(*a); });

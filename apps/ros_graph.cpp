@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <string_view>
 #include <utility>
 
 #include "apps/terminal.hpp"
@@ -50,6 +52,12 @@ std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, con
   return commands;
 }
 
+bool speaks_as_humble(Ros2Distribution distribution, const char* ros_distro) {
+  if (distribution != Ros2Distribution::environment) return distribution == Ros2Distribution::humble;
+  constexpr std::string_view kBeforeIron[] = {"foxy", "galactic", "humble"};
+  return ros_distro != nullptr && std::ranges::find(kBeforeIron, std::string_view(ros_distro)) != std::end(kBeforeIron);
+}
+
 #ifdef FBVINS_WITH_ROS2
 
 Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source, const Ros2Options& options) {
@@ -65,7 +73,7 @@ Result<RosGraph> RosGraph::join(const std::string& address, const std::string& s
   if (!name) return name.error();
   const auto qos = parse_ros2_qos(options.qos);
   if (!qos) return qos.error();
-  auto node = Ros2Node::join(*parsed, *name, options.distribution == Ros2Distribution::humble, *qos);
+  auto node = Ros2Node::join(*parsed, *name, speaks_as_humble(options.distribution, std::getenv("ROS_DISTRO")), *qos);
   if (!node) return node.error();
   graph.node_ = std::move(*node);
   return graph;

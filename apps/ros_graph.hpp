@@ -26,6 +26,9 @@ std::vector<RosParameter> ros_parameters(Config config);
 /// What everybody in the domain may ask of the flight: nothing where the user does not want that (live.ros2.commands).
 std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, const Ros2Options& options);
 
+/// Whether Humble's form of the message that tells of nodes is wanted. `ros_distro`: the environment's ROS_DISTRO, or null.
+bool speaks_as_humble(Ros2Distribution distribution, const char* ros_distro);
+
 class RosGraph {
  public:
   /// `address`: DOMAIN[:INTERFACE], empty: publish nothing. `source`: the flight's source, of any kind.

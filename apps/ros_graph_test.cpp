@@ -38,6 +38,14 @@ TEST(RosCommands, AreNoneWhereTheUserWantsNone) {
   EXPECT_TRUE(ros_commands(all, config.live.ros2).empty());
 }
 
+TEST(RosGraph, SpeaksAsTheEnvironmentsDistribution) {
+  EXPECT_TRUE(speaks_as_humble(Ros2Distribution::environment, "humble"));
+  for (const char* later : {"iron", "jazzy", "rolling", ""}) EXPECT_FALSE(speaks_as_humble(Ros2Distribution::environment, later));
+  EXPECT_FALSE(speaks_as_humble(Ros2Distribution::environment, nullptr));
+  EXPECT_FALSE(speaks_as_humble(Ros2Distribution::iron, "humble")) << "what is set counts";
+  EXPECT_TRUE(speaks_as_humble(Ros2Distribution::humble, "jazzy"));
+}
+
 TEST(RosGraph, WithoutAnAddressThereIsNone) {
   const auto graph = RosGraph::join("", "replay:nothing", {});
   ASSERT_TRUE(graph) << graph.error().message;

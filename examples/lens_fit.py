@@ -36,7 +36,7 @@ def rays_in_view(K, k, width, height):
 
 
 def fitted_equidistant(K, k, width, height):
-    """The equidistant lens next to the device's rational model, of which the estimator has no counterpart: (lens, error in px)."""
+    """The equidistant lens next to the device's rational model, which the socket does not carry: (lens, error in px)."""
     rays, pixels = rays_in_view(K, k, width, height)
     lens = numpy.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], 0, 0, 0, 0], float)
     for _ in range(20):

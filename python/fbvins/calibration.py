@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def load(path: PathLike, imu: Optional[PathLike] = None) -> _fbvins.Rig:
     """The format is recognised by content: Kalibr's camchain-imucam.yaml (cam0 is left, cam1 right), OpenVINS's estimator_config.yaml or
     kalibr_imucam_chain.yaml, Basalt's calibration.json (pinhole, pinhole-radtan8, kb4, ds, eucm), VINS-Fusion's configuration with its two camera
-    files (PINHOLE, KANNALA_BRANDT, MEI), a EuRoC folder. imu: noise figures in Kalibr's format, instead of the file's own."""
+    files (PINHOLE, KANNALA_BRANDT, MEI), VINS-Mono's and ORB-SLAM3's configurations, an OAK's JSON, Kimera-VIO's LeftCameraParams.yaml, a EuRoC
+    folder. imu: Kalibr's imu.yaml (imu.yaml:imu1 of several IMUs) or imu_utils, instead of the file's own noise figures."""
     return _fbvins.load_calibration(os.fspath(path), os.fspath(imu) if imu is not None else "")
 
 

@@ -26,11 +26,14 @@ Camera make_camera(int width, int height, double fx, double fy, double cx, doubl
                                                                                      {"equidistant", {"pinhole-equidistant", 4}},
                                                                                      {"ds", {"ds", 2}},
                                                                                      {"eucm", {"eucm", 2}},
-                                                                                     {"omni", {"omni-radtan", 5}}};
+                                                                                     {"omni", {"omni-radtan", 5}},
+                                                                                     {"radtan5", {"pinhole-radtan5", 5}},
+                                                                                     {"rational", {"pinhole-rational", 8}}};
   const auto known = kModels.find(model);
   if (known == kModels.end())
     throw nb::value_error(
-        fmt::format("model: 'radtan', 'equidistant', 'ds', 'eucm' or 'omni' is expected, not '{}'", model).c_str());
+        fmt::format("model: 'radtan', 'radtan5', 'rational', 'equidistant', 'ds', 'eucm' or 'omni' is expected, not '{}'", model)
+            .c_str());
   const auto& [name, count] = known->second;
   const std::vector<double> k = distortion.empty() && count == 4 ? std::vector<double>(4, 0.0) : distortion;
   if (k.size() != count)
@@ -108,7 +111,8 @@ void bind_camera(nb::module_& m) {
           nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
           "distortion"_a = std::vector<double>{}, "mask"_a = nb::none(),
           "model and its distortion: 'radtan' (k1, k2, p1, p2; OpenCV's and Kalibr's), 'equidistant' (k1..k4; Kalibr's, OpenCV's\n"
-          "fisheye), 'ds' (xi, alpha), 'eucm' (alpha, beta) or 'omni' (xi, k1, k2, p1, p2; Kalibr's omni with radtan, MEI).\n"
+          "fisheye), 'radtan5' (k1, k2, p1, p2, k3; ROS's plumb_bob), 'rational' (k1, k2, p1, p2, k3..k6; OpenCV's), 'ds' (xi,\n"
+          "alpha), 'eucm' (alpha, beta) or 'omni' (xi, k1, k2, p1, p2; Kalibr's omni with radtan, MEI).\n"
           "mask: uint8 (height, width), 0 where the image does not show the world, 255 elsewhere; None: all of it is used.")
       .def_prop_ro("width", &Camera::width, "px")
       .def_prop_ro("height", &Camera::height, "px")

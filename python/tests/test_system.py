@@ -273,7 +273,7 @@ def test_a_rig_of_ones_own(flight):
         fbvins.Rig(camera, camera, rig.T_BC0, 2 * rig.T_BC1)
     with pytest.raises(ValueError, match="apart"):
         fbvins.Rig(camera, camera, rig.T_BC0, rig.T_BC0)
-    with pytest.raises(ValueError, match="'radtan', 'equidistant', 'ds', 'eucm' or 'omni'"):
+    with pytest.raises(ValueError, match="'radtan', 'radtan5', 'rational', 'equidistant', 'ds', 'eucm' or 'omni'"):
         fbvins.Camera(752, 480, 1, 1, 1, 1, model="fov")
     wide = fbvins.Camera(512, 512, 158, 158, 255, 257, model="ds", distortion=[-0.17, 0.59])
     assert wide.model == "ds" and wide.distortion == [-0.17, 0.59] and wide.intrinsics == [158, 158, 255, 257]

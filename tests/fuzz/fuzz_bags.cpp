@@ -10,6 +10,8 @@
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/foreign_files.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/mcap_writer.hpp"
 #include "fbvins/io/ros_messages.hpp"
@@ -197,7 +199,19 @@ std::vector<std::string> foreign_calibration_seeds() {
       "projection_parameters:\n   fx: 4\n   fy: 4\n   cx: 3\n   cy: 2\n",
       "image_width: 8\nimage_height: 6\ncamera_matrix:\n  data: [4, 0, 3, 0, 4, 2, 0, 0, 1]\ndistortion_model: plumb_bob\n"
       "distortion_coefficients:\n  data: [0, 0, 0, 0, 0]\nrectification_matrix:\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
-      "projection_matrix:\n  data: [4, 0, 3, -0.4, 0, 4, 2, 0, 0, 0, 1, 0]\n"};
+      "projection_matrix:\n  data: [4, 0, 3, -0.4, 0, 4, 2, 0, 0, 0, 1, 0]\n",
+      "%YAML:1.0\nimu_topic: /imu\nmodel_type: PINHOLE\nimage_width: 8\nimage_height: 6\ndistortion_parameters: {k1: 0, k2: 0, p1: 0, p2: 0}\n"
+      "projection_parameters: {fx: 4, fy: 4, cx: 3, cy: 2}\nextrinsicRotation: {data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
+      "extrinsicTranslation: {data: [0, 0, 0]}\nacc_n: 1\ngyr_n: 1\nacc_w: 1\ngyr_w: 1\nrolling_shutter: 1\nrolling_shutter_tr: 0.02\n",
+      "%YAML:1.0\nCamera.type: PinHole\nCamera1.fx: 4\nCamera1.fy: 4\nCamera1.cx: 3\nCamera1.cy: 2\nCamera1.k1: 0\nCamera1.k2: 0\n"
+      "Camera.width: 8\nCamera.height: 6\nStereo.b: 0.1\nIMU.T_b_c1:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n"
+      "IMU.NoiseGyro: 1\nIMU.NoiseAcc: 1\nIMU.GyroWalk: 1\nIMU.AccWalk: 1\nIMU.Frequency: 200\n",
+      R"({"cameraData": [[1, {"cameraType": 0, "width": 8, "height": 6, "intrinsicMatrix": [[4, 0, 3], [0, 4, 2], [0, 0, 1]], "distortionCoeff": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], "extrinsics": {"toCameraSocket": -1}}]], "imuExtrinsics": {"rotationMatrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": {"x": 1, "y": 0, "z": 0}, "toCameraSocket": 1}})",
+      "camera_id: left\nT_BS: {data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\nrate_hz: 20\nresolution: [8, 6]\n"
+      "camera_model: pinhole\nintrinsics: [4, 4, 3, 2]\ndistortion_model: radtan\ndistortion_coefficients: [0, 0, 0, 0]\n",
+      "imu0:\n  T_i_b: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n  time_offset: 0\n  accelerometer_noise_density: 1\n"
+      "  accelerometer_random_walk: 1\n  gyroscope_noise_density: 1\n  gyroscope_random_walk: 1\n  update_rate: 200\n",
+      "Gyr: {avg-axis: {gyr_n: 1, gyr_w: 1}}\nAcc: {avg-axis: {acc_n: 1, acc_w: 1}}\n"};
 }
 
 void fuzz_foreign_calibration(std::string_view bytes) {
@@ -211,6 +225,14 @@ void fuzz_foreign_calibration(std::string_view bytes) {
   require_sentence(parse_vins_fusion(vins, {yaml, yaml}));
   require_sentence(parse_vins_fusion(yaml, {yaml}));
   require_sentence(parse_camera_info(yaml, yaml, {}));
+  require(!camera_info_alone(yaml).message.empty());
+  require_sentence(parse_vins_mono(yaml));
+  require_sentence(parse_orbslam(yaml));
+  require_sentence(parse_kimera({yaml}, yaml));
+  require_sentence(parse_oak(yaml));
+  foreign_file(std::string(bytes));
+  static const StereoRig rig = with_cameras({}, {{Camera(PinholeRadtan{4, 4, 3, 2}, 8, 6), {}}});
+  for (const char* which : {"", "imu1"}) require_sentence(with_imu_text(rig, "imu.yaml", std::string(bytes), which));
 }
 
 }  // namespace fbvins::fuzz

@@ -48,7 +48,8 @@ class Camera {
   int height() const { return height_; }
   /// Of a lens of one's own the pinhole with its focal lengths and centre.
   const LensModel& model() const { return model_; }
-  /// pinhole-radtan, pinhole-equidistant, ds, eucm or omni-radtan; of a lens of one's own its name.
+  /// pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan, pinhole-radtan5 or pinhole-rational; of a lens of one's own its
+  /// name.
   std::string model_name() const;
   /// fx, fy, cx, cy, px.
   std::array<double, 4> intrinsics() const;

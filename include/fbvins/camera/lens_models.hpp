@@ -40,6 +40,20 @@ struct UnifiedRadtan {
   double xi = 0, k1 = 0, k2 = 0, p1 = 0, p2 = 0;
 };
 
-using LensModel = std::variant<PinholeRadtan, KannalaBrandt, DoubleSphere, ExtendedUnified, UnifiedRadtan>;
+/// Pinhole with a third radial coefficient, ROS's "plumb_bob": n (1 + k1 s + k2 s^2 + k3 s^3) and PinholeRadtan's tangential
+/// part.
+struct PinholeRadtan5 {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+};
+
+/// OpenCV's rational model, ROS's "rational_polynomial", the same divided by 1 + k4 s + k5 s^2 + k6 s^3.
+struct PinholeRational {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
+};
+
+using LensModel =
+    std::variant<PinholeRadtan, KannalaBrandt, DoubleSphere, ExtendedUnified, UnifiedRadtan, PinholeRadtan5, PinholeRational>;
 
 }  // namespace fbvins

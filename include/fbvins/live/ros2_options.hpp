@@ -10,7 +10,11 @@ namespace fbvins {
 enum class Ros2Clock { sensors, ros };
 
 /// Whose nodes are to see this one. Since Iron the message that tells of nodes (rmw_dds_common) is another one.
-enum class Ros2Distribution { iron, humble };
+enum class Ros2Distribution {
+  environment,  ///< that of ROS_DISTRO, as ROS's setup.bash sets it; without it iron
+  iron,
+  humble
+};
 
 struct Ros2Options {
   std::string node = "fbvins";
@@ -19,7 +23,7 @@ struct Ros2Options {
   std::string base_frame = "base_link";
   std::string imu_frame = "imu_link";
   Ros2Clock clock = Ros2Clock::sensors;
-  Ros2Distribution distribution = Ros2Distribution::iron;
+  Ros2Distribution distribution = Ros2Distribution::environment;
   bool commands = true;
   std::string qos = {};
 
@@ -32,7 +36,8 @@ struct Ros2Options {
       "the vehicle: x forward, y left, z up, placed by live.mavlink.mounting; empty: none, the IMU itself");
     v("imu_frame", imu_frame, "", "the IMU's frame B; those of the cameras are named camera0_optical and so on");
     v("clock", clock, "sensors|ros", "whose clock stamps are on; ros: CLOCK_REALTIME of this machine");
-    v("distribution", distribution, "iron|humble", "ROS's distribution whose tools show the node; iron: that and all later ones");
+    v("distribution", distribution, "environment|iron|humble",
+      "ROS's distribution whose tools show the node; iron: that and all later ones; environment: as ROS_DISTRO says");
     v("commands", commands, "",
       "whether all in the domain may reset the estimator, save and load the map, and record, by services");
     v("qos", qos, "",

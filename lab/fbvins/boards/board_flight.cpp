@@ -60,7 +60,7 @@ BoardCamera::Instants poses(const SplineTrajectory& hand, const Pose<W, T>& T_WT
 }
 
 Result<BoardPattern> pattern_of(const BoardFlightOptions& options) {
-  Result<BoardPattern> pattern = BoardPattern::create(options.board);
+  Result<BoardPattern> pattern = BoardPattern::create(options.board, kKalibrBorder);  // as `fbvins target` prints it
   const int tags = options.board.kind == BoardKind::aprilgrid ? options.board.columns * options.board.rows : 0;
   for (const int tag : options.missing_tags) {
     if (tag < 0 || tag >= tags)

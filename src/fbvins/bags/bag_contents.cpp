@@ -2,6 +2,7 @@
 #include "fbvins/bags/bag_contents.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/quoted.hpp"
@@ -115,7 +117,27 @@ std::vector<ImuSample> ordered(ImuTopic& topic, RowCounts& counts) {
   return in_order(std::move(topic.samples), counts);
 }
 
+/// Where the topic's name says that its images are rectified, and that makes a difference.
+const BagCamera::Rectified* rectified_of(const BagCamera& camera, const std::string& topic) {
+  return camera.rectified && names_rectified(topic) ? &*camera.rectified : nullptr;
+}
+
 }  // namespace
+
+std::string rectified_topics(const BagContents& contents, const ChosenTopics& topics) {
+  std::vector<std::string> said;
+  for (const std::string& topic : topics.cameras) {
+    const BagCamera* camera = camera_for(contents, topic);
+    const auto* rectified = camera ? rectified_of(*camera, topic) : nullptr;
+    if (rectified &&
+        (!rectified->R_rectified_raw.isIdentity(0) || camera->camera.intrinsics() != rectified->camera.intrinsics() ||
+         camera->camera.distortion() != rectified->camera.distortion()))
+      said.push_back(printable(topic));
+  }
+  if (said.empty()) return "";
+  return fmt::format("the images on {} are taken as rectified by their name: R and P of camera_info are used, not K and D",
+                     fmt::join(said, ", "));
+}
 
 std::vector<ImuSample> readings_on(BagContents& contents, const std::string& imu, const std::string& accel, RowCounts& counts) {
   std::vector<ImuSample> readings = ordered(contents.imu.at(imu), counts);
@@ -177,11 +199,20 @@ Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics
   if (imu == contents.imu.end()) return missing("without an IMU the cameras' extrinsics to it are unknown");
   const std::string& body = imu->second.frame;
   std::vector<MountedCamera> cameras;
+  const BagCamera& first = *camera_for(contents, topics.cameras.front());
   for (const std::string& topic : topics.cameras) {
     const BagCamera* camera = camera_for(contents, topic);
     const auto T_BC = find_transform(contents.transforms, body, camera->frame);
     if (!T_BC) return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
-    cameras.push_back({camera->camera, T_BC->cast_frames<B, C0>()});
+    MountedCamera mounted{camera->camera, T_BC->cast_frames<B, C0>()};
+    if (const auto* rectified = rectified_of(*camera, topic)) {
+      // Messages of the second one may name the first one's frame, in whose rectified axes it lies at x.
+      const bool in_first = !cameras.empty() && camera->frame == first.frame && first.rectified;
+      const Mat3& R = in_first ? first.rectified->R_rectified_raw : rectified->R_rectified_raw;
+      mounted = {rectified->camera, mounted.T_BC * Pose<C0, C0>(Mat3(R.transpose()), Vec3::Zero()) *
+                                        Pose<C0, C0>(Quat::Identity(), Vec3(in_first ? rectified->x_m : 0.0, 0, 0))};
+    }
+    cameras.push_back(mounted);
   }
   const StereoRig rig = with_cameras({}, cameras);
   if (Result<void> good = check_rig(rig, "/tf_static"); !good) return good.error();

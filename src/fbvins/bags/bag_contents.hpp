@@ -73,8 +73,11 @@ struct ChosenTopics {
 /// All of the calibration, noise figures included, where the bag has it for these topics; of cameras that are not among them,
 /// too.
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics);
-/// From camera_info and transforms. The error says what is missing.
+/// From camera_info and transforms: K and D of raw images, R and P of topics that are called rectified. The error says what is
+/// missing.
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics);
+/// A sentence about the topics that are taken as rectified where that makes a difference; empty without.
+std::string rectified_topics(const BagContents& contents, const ChosenTopics& topics);
 /// Without those from number 2 on, which nobody has calibrated: colour cameras.
 std::vector<std::string> calibrated_cameras(const BagContents& contents, const ChosenTopics& topics);
 /// Why the depth images do not lie on those of the first camera, pixel by pixel, as far as the bag tells; empty: they do.

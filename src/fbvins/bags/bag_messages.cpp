@@ -9,6 +9,7 @@
 #include "fbvins/bags/depth_image.hpp"
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/quoted.hpp"
 
@@ -51,11 +52,62 @@ bool is_straight(std::string_view model, const std::vector<double>& d) {
          std::all_of(d.begin(), d.end(), [](double x) { return x == 0; });
 }
 
-/// More coefficients than ours must be zero.
-bool fits_four(const std::vector<double>& d) {
-  for (std::size_t i = 4; i < d.size(); ++i)
-    if (d[i] != 0) return false;
-  return true;
+/// What stands behind K in a CameraInfo; harmless where the message ends before.
+struct InfoTail {
+  std::vector<double> R, P;
+  std::uint32_t binning_x = 1, binning_y = 1;
+  std::uint32_t x = 0, y = 0, height = 0, width = 0;  ///< region of interest, of the whole sensor's pixels; size 0: all
+};
+
+InfoTail read_tail(MessageFields& in) {
+  InfoTail out{doubles(in, 9), doubles(in, 12)};
+  if (!in.ok()) return {};
+  for (std::uint32_t* field : {&out.binning_x, &out.binning_y, &out.x, &out.y, &out.height, &out.width})
+    *field = in.get<std::uint32_t>();
+  if (!in.ok()) out.binning_x = out.binning_y = 1, out.x = out.y = out.width = out.height = 0;
+  out.binning_x = std::max(out.binning_x, 1u), out.binning_y = std::max(out.binning_y, 1u);
+  return out;
+}
+
+/// The lens of the whole sensor for images that are cut out of it, then binned.
+Camera cut_and_binned(const Camera& camera, const InfoTail& tail) {
+  const bool part = tail.width > 0 && tail.height > 0;
+  const std::uint32_t width = (part ? tail.width : camera.width()) / tail.binning_x,
+                      height = (part ? tail.height : camera.height()) / tail.binning_y;
+  if (tail.binning_x == 1 && tail.binning_y == 1 && !part) return camera;
+  const bool inside = width > 0 && height > 0 && width <= kLargestImageSide_px && height <= kLargestImageSide_px &&
+                      tail.x < static_cast<std::uint32_t>(camera.width()) && tail.y < static_cast<std::uint32_t>(camera.height());
+  if (!inside) return camera;
+  LensModel lens = camera.model();
+  std::visit(
+      [&](auto& m) {
+        m.fx /= tail.binning_x, m.fy /= tail.binning_y;
+        m.cx = (m.cx - tail.x + 0.5) / tail.binning_x - 0.5, m.cy = (m.cy - tail.y + 0.5) / tail.binning_y - 0.5;
+      },
+      lens);
+  return {lens, static_cast<int>(width), static_cast<int>(height)};
+}
+
+std::optional<BagCamera::Rectified> rectified(const Camera& raw, const InfoTail& tail) {
+  if (tail.P.size() != 12 || !(tail.P[0] > 0 && tail.P[5] > 0)) return std::nullopt;
+  BagCamera::Rectified out{Camera(PinholeRadtan{tail.P[0], tail.P[5], tail.P[2], tail.P[6]}, raw.width(), raw.height())};
+  out.R_rectified_raw << tail.R[0], tail.R[1], tail.R[2], tail.R[3], tail.R[4], tail.R[5], tail.R[6], tail.R[7], tail.R[8];
+  if (!((out.R_rectified_raw.transpose() * out.R_rectified_raw - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3) ||
+      !std::isfinite(tail.P[2]) || !std::isfinite(tail.P[6]) || !std::isfinite(tail.P[3]))
+    return std::nullopt;
+  out.x_m = -tail.P[3] / tail.P[0];
+  const std::vector<double> k = raw.distortion();
+  const bool same = raw.intrinsics() == out.camera.intrinsics() && raw.model_name() == "pinhole-radtan" &&
+                    std::ranges::all_of(k, [](double x) { return x == 0; }) && out.R_rectified_raw.isIdentity(0) && out.x_m == 0;
+  if (same) return std::nullopt;
+  out.camera = cut_and_binned(out.camera, tail);
+  return out;
+}
+
+BagCamera as_recorded(BagCamera whole, const InfoTail& tail) {
+  whole.rectified = rectified(whole.camera, tail);
+  whole.camera = cut_and_binned(whole.camera, tail);
+  return whole;
 }
 
 }  // namespace
@@ -133,20 +185,29 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
   const std::string model(in.text());
   const std::vector<double> d = doubles(in, in.get<std::uint32_t>()), k = doubles(in, 9);
-  if (!in.ok() || !(k[0] > 0 && k[4] > 0) || width < 1 || height < 1 || width > kLargestImageSide_px ||
+  const bool read = in.ok();
+  const InfoTail tail = read_tail(in);
+  if (!read || !(k[0] > 0 && k[4] > 0) || width < 1 || height < 1 || width > kLargestImageSide_px ||
       height > kLargestImageSide_px)
     return Error{ErrorCode::malformed, "this is no camera's calibration"};
-  const bool plumb_bob = model == "plumb_bob" || model.empty() || model == "Brown Conrady" || is_straight(model, d),
-             equidistant = model == "equidistant" || model == "fisheye" || model == "Kannala Brandt4";
-  std::vector<double> c = d;
-  if ((plumb_bob || equidistant) && fits_four(d)) c.resize(4, 0.0);
+  const std::array<double, 4> f{k[0], k[4], k[2], k[5]};
+  const auto w = static_cast<int>(width), h = static_cast<int>(height);
   // Other names are those of our own bags.
-  const std::string name = plumb_bob ? "pinhole-radtan" : equidistant ? "pinhole-equidistant" : model;
-  if (const auto lens = lens_of(name, {k[0], k[4], k[2], k[5]}, c))
-    return BagCamera{Camera(*lens, static_cast<int>(width), static_cast<int>(height)), frame};
-  return Error{ErrorCode::unsupported,
-               fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob and equidistant with four are known",
-                           fbvins::quoted(model), d.size())};
+  if (const auto lens = lens_of(model, f, d)) return as_recorded({Camera(*lens, w, h), frame}, tail);
+  const DistortionKind kind = model.empty() ? DistortionKind::brown : distortion_kind(model);
+  const bool straight = is_straight(model, d) || kind == DistortionKind::none;
+  if (!straight && kind == DistortionKind::unknown)
+    return Error{
+        ErrorCode::unsupported,
+        fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob, rational_polynomial and equidistant "
+                    "are known",
+                    fbvins::quoted(model), d.size())};
+  const Result<Camera> camera = straight                              ? opencv_camera(f, {}, w, h)
+                                : kind == DistortionKind::equidistant ? fisheye_camera(f, d, w, h)
+                                                                      : opencv_camera(f, d, w, h);
+  if (camera) return as_recorded({*camera, frame}, tail);
+  return Error{camera.error().code,
+               fmt::format("a camera of the model '{}': its distortion {}", fbvins::quoted(model), camera.error().message)};
 }
 
 std::optional<BagTransform> transform_of(std::string_view bytes, Encoding encoding) {

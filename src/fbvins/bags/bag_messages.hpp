@@ -32,10 +32,19 @@ std::string encoding_of(std::string_view bytes, Encoding encoding);
 /// The largest value of an uncompressed image of 16-bit values; none for any other.
 std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding);
 
-/// sensor_msgs/CameraInfo, and the frame it names.
+/// sensor_msgs/CameraInfo, and the frame it names. The camera is that of the images as they are recorded: binned, and cut out by
+/// the region of interest.
 struct BagCamera {
   Camera camera;
   std::string frame;
+  /// By R and P, what image_proc makes of its images: a camera without distortion, turned. None where it would be the same
+  /// camera, or the message has no P.
+  struct Rectified {
+    Camera camera;
+    Mat3 R_rectified_raw = Mat3::Identity();
+    double x_m = 0;  ///< of its centre in the rectified frame of the first camera of the pair
+  };
+  std::optional<Rectified> rectified = {};
 };
 /// An error for a model that is not known.
 Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 
 namespace fbvins {
 namespace {
@@ -24,13 +26,7 @@ std::string beside(const std::string& file, const std::string& name) { return (f
 bool holds(const std::string& text, const char* word) { return text.find(word) != std::string::npos; }
 
 Result<StereoRig> with_imu(Result<StereoRig> rig, const std::string& imu_path) {
-  if (!rig || imu_path.empty()) return rig;
-  const Result<std::string> text = read_file(imu_path, kLargestYaml_bytes);
-  if (!text) return text.error();
-  const Result<ImuNoise> noise = parse_kalibr_imu({imu_path, *text});
-  if (!noise) return noise.error();
-  rig->imu_noise = *noise;
-  return rig;
+  return !rig || imu_path.empty() ? rig : with_imu_file(*rig, imu_path);
 }
 
 /// Its estimator_config.yaml names the other two.
@@ -60,6 +56,34 @@ Result<StereoRig> load_vins_fusion(const std::string& path, const std::string& t
     cameras.emplace_back(name, *std::move(camera));
   }
   return parse_vins_fusion(std::move(yaml), std::move(cameras));
+}
+
+/// The files beside it are named alike.
+Result<StereoRig> load_kimera(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  std::vector<YamlReader> cameras;
+  std::optional<YamlReader> imu;
+  const auto read = [&](const std::string& name) -> Result<YamlReader> {
+    const Result<std::string> text = read_file(name, kLargestYaml_bytes);
+    if (!text) return text.error();
+    return YamlReader(name, *text);
+  };
+  std::error_code ignored;
+  const fs::path left = folder / "LeftCameraParams.yaml", right = folder / "RightCameraParams.yaml",
+                 noise = folder / "ImuParams.yaml";
+  const bool known = fs::exists(left, ignored);
+  for (const fs::path& name : {known ? left : fs::path(path), right}) {
+    if (!cameras.empty() && (!known || !fs::exists(name, ignored))) break;
+    Result<YamlReader> camera = read(name.string());
+    if (!camera) return camera.error();
+    cameras.push_back(*std::move(camera));
+  }
+  if (fs::exists(noise, ignored)) {
+    Result<YamlReader> file = read(noise.string());
+    if (!file) return file.error();
+    imu = *std::move(file);
+  }
+  return parse_kimera(std::move(cameras), std::move(imu));
 }
 
 Result<StereoRig> load_euroc(const std::string& folder) {
@@ -100,6 +124,11 @@ std::string calibration_format(const std::string& text) {
   if (holds(text, "body_T_cam0")) return "VINS-Fusion";
   if (holds(text, "\"value0\"")) return "Basalt";
   if (holds(text, "T_cam_imu")) return "Kalibr";
+  if (holds(text, "projection_parameters") && (holds(text, "extrinsicRotation") || holds(text, "imu_topic"))) return "VINS-Mono";
+  if (holds(text, "Camera.type") || holds(text, "Camera.fx") || holds(text, "Camera1.fx")) return "ORB-SLAM3";
+  if (holds(text, "\"cameraData\"")) return "OAK";
+  if (holds(text, "camera_id") && holds(text, "T_BS")) return "Kimera";
+  if (holds(text, "camera_matrix") && holds(text, "distortion_coefficients")) return "camera_info";
   if (holds(text, "relative_config_imucam") || holds(text, "T_imu_cam")) return "OpenVINS";
   return "";
 }
@@ -118,6 +147,11 @@ Result<StereoRig> load_calibration(const std::string& path, const std::string& i
   if (format == "OpenVINS") return load_openvins(path, *text, imu_path);
   if (format == "Basalt") return with_imu(parse_basalt({path, *text}), imu_path);
   if (format == "VINS-Fusion") return with_imu(load_vins_fusion(path, *text), imu_path);
+  if (format == "VINS-Mono") return with_imu(parse_vins_mono({path, *text}), imu_path);
+  if (format == "ORB-SLAM3") return with_imu(parse_orbslam({path, *text}), imu_path);
+  if (format == "OAK") return with_imu(parse_oak({path, *text}), imu_path);
+  if (format == "Kimera") return with_imu(load_kimera(path), imu_path);
+  if (format == "camera_info") return camera_info_alone({path, *text});
   return load_kalibr(path, imu_path.empty() ? std::nullopt : std::optional(imu_path));
 }
 

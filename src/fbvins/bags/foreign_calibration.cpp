@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "fbvins/camera/camera_times.hpp"
+#include "fbvins/camera/opencv_lens.hpp"
+#include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/image_decode.hpp"
 
@@ -62,9 +64,11 @@ Camera basalt_camera(YamlReader& yaml, const YAML::Node& root, std::size_t index
     return {KannalaBrandt{fx, fy, cx, cy, number("k1"), number("k2"), number("k3"), number("k4")}, sides[0], sides[1]};
   if (model == "pinhole") return {PinholeRadtan{fx, fy, cx, cy}, sides[0], sides[1]};
   if (model == "pinhole-radtan8") {
-    for (const char* higher : {"k3", "k4", "k5", "k6"})
-      if (yaml.ok() && number(higher) != 0) yaml.complain(k, higher, "is not 0, and only k1, k2, p1, p2 are known");
-    return {PinholeRadtan{fx, fy, cx, cy, number("k1"), number("k2"), number("p1"), number("p2")}, sides[0], sides[1]};
+    std::vector<double> eight;
+    for (const char* name : {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}) eight.push_back(number(name));
+    const Result<Camera> lens = opencv_camera({fx, fy, cx, cy}, eight, sides[0], sides[1]);
+    if (yaml.ok() && !lens) yaml.complain(k, "k1", lens.error().message);
+    return yaml.ok() ? *lens : Camera();
   }
   if (model == "ds" || model == "eucm") {
     const std::vector<double> own =
@@ -127,6 +131,13 @@ Camera camodocal_camera(YamlReader& yaml) {
   return {};
 }
 
+/// Of single readings at 200 Hz.
+ImuNoise vins_noise(YamlReader& yaml) {
+  constexpr double kRate_hz = 200;
+  const auto density = [&](const char* field) { return yaml.positive(yaml.root(), field) / std::sqrt(kRate_hz); };
+  return {density("gyr_n"), density("acc_n"), density("gyr_w"), density("acc_w"), kRate_hz};
+}
+
 Pose<B, C0> body_T_cam(YamlReader& yaml, const std::string& field) {
   const YAML::Node T = inner(yaml, yaml.root(), field);
   return yaml.ok() ? read_transform<B, C0>(yaml, T, "data") : Pose<B, C0>();
@@ -150,15 +161,21 @@ RosCamera ros_camera(YamlReader& yaml) {
   const std::string model = yaml.word(root, "distortion_model");
   if (yaml.ok() && !(k[0] > 0 && k[4] > 0 && P[0] > 0))
     yaml.complain(root, "camera_matrix", "the focal lengths are not positive");
-  if (yaml.ok() && std::any_of(d.begin() + std::min<std::ptrdiff_t>(4, std::ssize(d)), d.end(), [](double x) { return x != 0; }))
-    yaml.complain(root, "distortion_coefficients", "has more than four that are not zero");
-  if (yaml.ok() && model != "plumb_bob" && model != "equidistant")
-    yaml.complain(root, "distortion_model", fmt::format("'{}' is not supported, only plumb_bob and equidistant", model));
+  const DistortionKind kind = distortion_kind(model);
+  if (yaml.ok() && kind == DistortionKind::unknown)
+    yaml.complain(root, "distortion_model",
+                  fmt::format("'{}' is not supported, only plumb_bob, rational_polynomial and equidistant", model));
   if (!yaml.ok()) return {};
-  d.resize(4, 0.0);
+  const std::array<double, 4> f{k[0], k[4], k[2], k[5]};
+  if (kind == DistortionKind::none) d.clear();
+  const Result<Camera> camera =
+      kind == DistortionKind::equidistant ? fisheye_camera(f, d, width, height) : opencv_camera(f, d, width, height);
+  if (!camera) {
+    yaml.complain(root, "distortion_coefficients", camera.error().message);
+    return {};
+  }
   RosCamera out;
-  out.camera = model == "plumb_bob" ? Camera(PinholeRadtan{k[0], k[4], k[2], k[5], d[0], d[1], d[2], d[3]}, width, height)
-                                    : Camera(KannalaBrandt{k[0], k[4], k[2], k[5], d[0], d[1], d[2], d[3]}, width, height);
+  out.camera = *camera;
   out.rectification << R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8];
   out.shift_m = P[3] / P[0];
   return out;
@@ -197,6 +214,32 @@ Result<StereoRig> parse_basalt(YamlReader yaml) {  // JSON is YAML
   return finished(yaml, rig);
 }
 
+Result<StereoRig> parse_vins_mono(YamlReader yaml) {
+  const YAML::Node& root = yaml.root();
+  const Camera camera = camodocal_camera(yaml);
+  if (yaml.ok() && !yaml.has(root, "extrinsicRotation"))
+    yaml.complain(
+        root, "extrinsicRotation",
+        "is missing: the camera's place on the IMU is not given; take what VINS has estimated, or calibrate with `fbvins calibrate`");
+  const std::vector<double> r = yaml.numbers(inner(yaml, root, "extrinsicRotation"), "data", 9),
+                            p = yaml.numbers(inner(yaml, root, "extrinsicTranslation"), "data", 3);
+  if (!yaml.ok()) return yaml.error();
+  Mat3 R;
+  R << r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8];
+  if (const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff(); !(off < 3e-3) || !(R.determinant() > 0))
+    yaml.complain(root, "extrinsicRotation",
+                  fmt::format("is not a rotation: its columns are not of length 1 and orthogonal by up to {:.2g}", off));
+  StereoRig rig = with_cameras({}, {{camera, Pose<B, C0>(Quat(R).normalized(), Vec3(p[0], p[1], p[2]))}});
+  rig.imu_noise = vins_noise(yaml);
+  rig.time_offset_s = yaml.number_between(root, "td", -10, 10, 0);
+  if (yaml.number_between(root, "rolling_shutter", 0, 1, 0) == 1 && camera.height() > 0) {
+    const double readout_s = yaml.number_between(root, "rolling_shutter_tr", 0, 0.2, 0);
+    rig.line_delay_s = readout_s / camera.height();
+    rig.time_offset_s += 0.5 * readout_s;  // ours is the middle row's
+  }
+  return finished(yaml, rig);
+}
+
 Result<StereoRig> parse_vins_fusion(YamlReader yaml, std::vector<YamlReader> files) {
   std::vector<MountedCamera> cameras;
   for (YamlReader& file : files) {
@@ -206,11 +249,42 @@ Result<StereoRig> parse_vins_fusion(YamlReader yaml, std::vector<YamlReader> fil
   }
   if (!yaml.ok()) return yaml.error();
   StereoRig rig = with_cameras({}, cameras);
-  constexpr double kRate_hz = 200;
-  const auto density = [&](const char* field) { return yaml.positive(yaml.root(), field) / std::sqrt(kRate_hz); };
-  rig.imu_noise = {density("gyr_n"), density("acc_n"), density("gyr_w"), density("acc_w"), kRate_hz};
+  rig.imu_noise = vins_noise(yaml);
   rig.time_offset_s = yaml.number_between(yaml.root(), "td", -10, 10, 0);
   return finished(yaml, rig);
+}
+
+Error camera_info_alone(YamlReader yaml) {
+  const RosCamera ros = ros_camera(yaml);
+  if (!yaml.ok()) return yaml.error();
+  const KalibrCamera k = kalibr_camera(ros.camera);
+  return {ErrorCode::unsupported,
+          fmt::format(
+              "{}: this is a camera_info file of ROS, without the camera's place on the IMU: write it as Kalibr's chain, with "
+              "T_cam_imu beside camera_model: {}, intrinsics: {}, distortion_model: {}, distortion_coeffs: {}, resolution: "
+              "[{}, {}]",
+              yaml.file(), k.model, yaml_list(k.intrinsics), k.distortion, yaml_list(k.coefficients), ros.camera.width(),
+              ros.camera.height())};
+}
+
+Result<StereoRig> parse_kimera(std::vector<YamlReader> files, std::optional<YamlReader> imu_file) {
+  std::vector<CameraSensor> cameras;
+  for (YamlReader& file : files) {
+    const Result<CameraSensor> camera = parse_euroc_camera(file);
+    if (!camera) return camera.error();
+    cameras.push_back(*camera);
+  }
+  ImuSensor imu;
+  if (imu_file) {
+    const Result<ImuSensor> read = parse_euroc_imu(*imu_file);
+    if (!read) return read.error();
+    imu = *read;
+    // To be added to the IMU's stamps.
+    const double shift_s = imu_file->number_between(imu_file->root(), "imu_time_shift", -10, 10, 0);
+    if (!imu_file->ok()) return imu_file->error();
+    for (CameraSensor& camera : cameras) camera.time_offset_s = -shift_s;
+  }
+  return join_euroc(cameras, imu, files.front().file());
 }
 
 Result<StereoRig> parse_camera_info(YamlReader left, YamlReader right, const Pose<B, C0>& T_BC0) {

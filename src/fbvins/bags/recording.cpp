@@ -17,6 +17,7 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/options.hpp"
+#include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -112,7 +113,9 @@ class BagLoader : public FrameLoader {
 class BagRecording {
  public:
   BagRecording(std::string path, const RecordingOptions& options, std::optional<StereoRig> rig)
-      : path_(std::move(path)), options_(options), rig_(std::move(rig)) {}
+      : path_(std::move(path)), options_(options), rig_(std::move(rig)) {
+    if (!options_.calibration.empty() && is_kalibr(options_.calibration)) rostopics_ = rostopics_of(options_.calibration);
+  }
 
   Result<DatasetContents> read(std::unique_ptr<BagReader> bag) {
     const DatasetOptions& o = options_.dataset;
@@ -154,10 +157,15 @@ class BagRecording {
       if (!rig) return rig.error();
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
+      if (std::string said = rectified_topics(contents_, topics_); !said.empty()) out_.info.warnings.push_back(std::move(said));
     }
     if (std::cmp_greater(topics_.cameras.size(), rig_->camera_count()))
       return Error{ErrorCode::invalid_argument, fmt::format("images of {} cameras are to be used, and the calibration has {}",
                                                             topics_.cameras.size(), rig_->camera_count())};
+    if (const auto order = order_by_topics(rostopics_, topics_.cameras); !order.empty()) {
+      rig_ = in_order(*rig_, order);
+      out_.info.warnings.push_back(order_sentence(options_.calibration, order));
+    }
     std::vector<MountedCamera> cameras;
     for (std::size_t i = 0; i < topics_.cameras.size(); ++i) cameras.push_back(rig_->mounted(static_cast<int>(i)));
     out_.rig = *rig_;
@@ -267,6 +275,7 @@ class BagRecording {
   std::string path_;
   const RecordingOptions& options_;
   std::optional<StereoRig> rig_;
+  std::vector<std::string> rostopics_;  ///< of the cameras of a Kalibr chain that is given; empty without
   BagContents contents_;
   ChosenTopics topics_;
   bool named_ = false;              ///< topics of images are given, and not found

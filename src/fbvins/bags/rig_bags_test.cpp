@@ -10,6 +10,7 @@
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
+#include "fbvins/io/ros_messages.hpp"
 
 namespace fbvins {
 namespace rig_bags_test {
@@ -196,6 +197,54 @@ TEST(RigTopics, CamerasThatNobodyHasCalibratedAreLeftOut) {
   const auto rig = rig_of(contents, *topics);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->T_BC(2).p.y(), 0.1 * 3);
+}
+
+TEST(RigTopics, RectifiedImagesAreThoseOfRAndP) {
+  EXPECT_TRUE(names_rectified("/stereo/left/image_rect") && names_rectified("/left/image_rect_color") &&
+              names_rectified("/left/rect/image") && names_rectified("/cam0/rectified"));
+  EXPECT_FALSE(names_rectified("/direct/image_raw") || names_rectified("/left/image_raw") || names_rectified("/left/correct"));
+  BagContents contents;
+  contents.imu["/imu"].frame = "imu";
+  const Mat3 R = so3_exp({0.01, -0.02, 0.03}).toRotationMatrix();
+  const Camera straight(PinholeRadtan{80, 80, 41, 31}, kWidth, kHeight);
+  for (const std::string side : {"left", "right"}) {
+    contents.images["/" + side + "/image_rect"], contents.images["/" + side + "/image_raw"];
+    contents.cameras["/" + side + "/camera_info"] = {rig_of_cameras(1).left, side, BagCamera::Rectified{straight, R, 0.1}};
+    contents.transforms.push_back({"imu", side, Quat::Identity(), Vec3(0, side == "left" ? 0 : 0.2, 0)});
+  }
+  const ChosenTopics rectified{{"/left/image_rect", "/right/image_rect"}, "/imu", "", ""},
+      raw{{"/left/image_raw", "/right/image_raw"}, "/imu", "", ""};
+  EXPECT_EQ(rig_of(contents, raw)->left.intrinsics()[0], 90);
+  EXPECT_EQ(rectified_topics(contents, raw), "");
+  EXPECT_NE(rectified_topics(contents, rectified).find("/left/image_rect, /right/image_rect are taken as rectified"),
+            std::string::npos);
+  auto rig = rig_of(contents, rectified);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->left.intrinsics()[0], 80);
+  EXPECT_LT((rig->T_BC0.R() - R.transpose()).norm(), 1e-12);
+  EXPECT_LT((rig->T_BC1.p - Vec3(0, 0.2, 0)).norm(), 1e-12) << "where its own frame is";
+  contents.cameras["/right/camera_info"].frame = "left";
+  rig = rig_of(contents, rectified);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_LT((rig->T_BC1.p - R.transpose() * Vec3(0.1, 0, 0)).norm(), 1e-12) << "in the first one's rectified axes";
+}
+
+TEST(RigTopics, ABinnedAndCutImageHasItsOwnLens) {
+  std::string info;
+  append_camera_info(info, at(0), "frame", Camera(PinholeRadtan{400, 410, 321, 239, 0.1, 0, 0, 0}, 640, 480));
+  const auto set = [&](std::size_t field, std::uint32_t value) {  // binning_x, binning_y, x, y, height, width; then do_rectify
+    std::memcpy(info.data() + info.size() - 25 + 4 * field, &value, 4);
+  };
+  const auto lens = [&] { return camera_of(info, Encoding::cdr)->camera; };
+  EXPECT_EQ(lens().width(), 640);
+  set(0, 2), set(1, 2);
+  EXPECT_EQ(lens().width(), 320);
+  EXPECT_EQ(lens().intrinsics(), (std::array{200.0, 205.0, 160.25, 119.25}));
+  set(2, 100), set(3, 40), set(4, 400), set(5, 400);
+  EXPECT_EQ(lens().height(), 200);
+  EXPECT_EQ(lens().intrinsics(), (std::array{200.0, 205.0, 110.25, 99.25}));
+  set(2, 900);
+  EXPECT_EQ(lens().width(), 640) << "a region outside of the image is none";
 }
 
 TEST(RigTopics, DepthImagesAreNoCameras) {

@@ -183,6 +183,15 @@ bool names_depth(const std::string& topic) {
   return false;
 }
 
+bool names_rectified(const std::string& topic) {
+  const auto is_letter = [&](std::size_t i) {
+    return i < topic.size() && std::isalpha(static_cast<unsigned char>(topic[i])) != 0;
+  };
+  for (std::size_t at = topic.find("rect"); at != std::string::npos; at = topic.find("rect", at + 1))
+    if ((at == 0 || !is_letter(at - 1)) && (!is_letter(at + 4) || topic.compare(at + 4, 5, "ified") == 0)) return true;
+  return false;
+}
+
 Result<ChosenTopics> choose_topics(const BagContents& contents, const std::vector<std::string>& named,
                                    const WantedTopics& wanted) {
   Result<ChosenTopics> out = sorted_by_kind(contents, named);

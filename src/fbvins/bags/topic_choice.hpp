@@ -31,5 +31,7 @@ Result<ChosenTopics> choose_cameras(const BagContents& contents, const std::vect
 
 /// Whether a word of the topic's name is "depth": there, no camera's images are.
 bool names_depth(const std::string& topic);
+/// Whether the name says that the images are rectified, as image_proc's are: `rect` as a word (image_rect, image_rect_color).
+bool names_rectified(const std::string& topic);
 
 }  // namespace fbvins

@@ -6,11 +6,13 @@
 #include <algorithm>
 
 #include "fbvins/calibration/corner_refine.hpp"
+#include "fbvins/calibration/grid_fill.hpp"
+#include "fbvins/calibration/grid_tags.hpp"
 
 namespace fbvins {
 namespace {
 
-// A tag's border is an eighth of it wide: below this it is less than two pixels.
+// The border of a tag, an eighth or a fifth of it, is less than two or three pixels wide below this.
 constexpr double kSmallestTag_px = 16;
 constexpr double kLargestRadius_px = 6;
 
@@ -29,29 +31,31 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
         fmt::format("only AprilGrids are found in images: record one that `fbvins target` prints, or give the corners of this "
                     "{} by --detections",
                     board.kind == BoardKind::charuco ? "ChArUco board" : "chessboard")};
-  Result<TagDetector> detector = TagDetector::create();
+  Result<TagDetector> detector = TagDetector::create({kLibraryBorder, kKalibrBorder});
   if (!detector) return detector.error();
-  return BoardDetector(board, *std::move(detector));
+  std::vector<TagCells> all;
+  for (int id = 0; id < board.columns * board.rows; ++id) {
+    const Result<TagCells> cells = tag_cells(id);
+    if (!cells) return cells.error();
+    all.push_back(*cells);
+  }
+  return BoardDetector(board, std::move(all), *std::move(detector));
 }
 
 BoardDetection BoardDetector::find(const ImageView& image) {
   BoardDetection out;
-  const std::vector<TagDetection> tags = detector_.find(image, board_.columns * board_.rows / 2);
-  for (std::size_t i = 0; i < tags.size(); ++i) {
-    const TagDetection& tag = tags[i];
-    if (tag.id >= board_.columns * board_.rows) {
-      ++out.foreign_tags;
-      continue;
-    }
-    if ((i > 0 && tags[i - 1].id == tag.id) || (i + 1 < tags.size() && tags[i + 1].id == tag.id)) {
-      out.twice += i == 0 || tags[i - 1].id != tag.id;
-      continue;
-    }
-    ++out.tags;
+  GridTags seen = tags_of_grid(board_, detector_.find(image, board_.columns * board_.rows / 2));
+  if (seen.twice == 0) seen.tags = with_missing_tags(board_, cells_, image, std::move(seen.tags));
+  out.tags = static_cast<int>(seen.tags.size());
+  out.foreign_tags = seen.foreign;
+  out.twice = seen.twice;
+  for (const TagDetection& tag : seen.tags) {
     const double side_px = shortest_side_px(tag);
     if (side_px < kSmallestTag_px) continue;
-    // No other edge within: the border's inner one is an eighth of the tag away, the square's between the tags its own width.
-    const double radius_px = std::clamp(side_px * std::min(0.125, board_.spacing), 2.0, kLargestRadius_px);
+    // No other edge within: the border's inner one is as far from the tag's edge as it is wide, the square's between the tags its
+    // own width.
+    const double border = static_cast<double>(tag.border) / cells_across(tag.border);
+    const double radius_px = std::clamp(side_px * std::min(border, board_.spacing), 2.0, kLargestRadius_px);
     for (int k = 0; k < 4; ++k)
       if (const auto corner = refine_corner(image, tag.corners[k], tag.corners[(k + 1) % 4] - tag.corners[k],
                                             tag.corners[(k + 3) % 4] - tag.corners[k], radius_px))
@@ -63,7 +67,8 @@ BoardDetection BoardDetector::find(const ImageView& image) {
 bool BoardDetector::finds_mirrored(const ImageView& image) {
   Image mirrored(image.width, image.height);
   for (int y = 0; y < image.height; ++y) std::reverse_copy(image.row(y), image.row(y) + image.width, mirrored.row(y));
-  return detector_.find(mirrored.view(), 3).size() >= 3;
+  const GridTags seen = tags_of_grid(board_, detector_.find(mirrored.view(), 3));
+  return static_cast<int>(seen.tags.size()) + seen.foreign >= 3;
 }
 
 }  // namespace fbvins

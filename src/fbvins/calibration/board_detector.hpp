@@ -30,9 +30,11 @@ class BoardDetector {
   bool finds_mirrored(const ImageView& image);
 
  private:
-  BoardDetector(const Board& board, TagDetector detector) : board_(board), detector_(std::move(detector)) {}
+  BoardDetector(const Board& board, std::vector<TagCells> cells, TagDetector detector)
+      : board_(board), cells_(std::move(cells)), detector_(std::move(detector)) {}
 
   Board board_;
+  std::vector<TagCells> cells_;  ///< of each of its tags
   TagDetector detector_;
 };
 

@@ -5,14 +5,14 @@
 
 namespace fbvins {
 
-Result<BoardPattern> BoardPattern::create(const Board& board) {
-  BoardPattern out(board);
+Result<BoardPattern> BoardPattern::create(const Board& board, int border) {
+  BoardPattern out(board, border);
   if (board.kind == BoardKind::charuco) return Error{ErrorCode::unsupported, "ChArUco boards cannot be rendered"};
   if (board.kind == BoardKind::chessboard) return out;
   for (int id = 0; id < board.columns * board.rows; ++id) {
     Result<TagCells> cells = tag_cells(id);
     if (!cells) return cells.error();
-    out.tags_.push_back(*cells);
+    out.tags_.emplace_back(*cells);
   }
   return out;
 }
@@ -32,9 +32,10 @@ std::optional<bool> BoardPattern::black(double x_m, double y_m) const {
   if (column < -1 || row < -1 || column > board_.columns || row > board_.rows) return std::nullopt;
   const bool square = column >= 0 && row >= 0 && x < gap && y < gap;
   if (column < 0 || row < 0 || column == board_.columns || row == board_.rows || x < gap || y < gap) return square;
-  const int cell_x = std::min(7, static_cast<int>((x - gap) / size * 8)),
-            cell_y = std::min(7, static_cast<int>((y - gap) / size * 8));
-  return tags_[static_cast<std::size_t>(row * board_.columns + column)][7 - cell_y][cell_x];  // y is upwards, rows from the top
+  const int cells = cells_across(border_), cell_x = std::min(cells - 1, static_cast<int>((x - gap) / size * cells)),
+            cell_y = std::min(cells - 1, static_cast<int>((y - gap) / size * cells));
+  const auto& tag = tags_[static_cast<std::size_t>(row * board_.columns + column)];
+  return tag && is_black(*tag, border_, cells - 1 - cell_y, cell_x);  // y is upwards, rows from the top
 }
 
 }  // namespace fbvins

@@ -13,7 +13,8 @@ namespace fbvins {
 
 class BoardPattern {
  public:
-  static Result<BoardPattern> create(const Board& board);
+  /// An AprilGrid's tags have a border of so many cells.
+  static Result<BoardPattern> create(const Board& board, int border = kLibraryBorder);
 
   /// Leaves the tag's place white.
   void leave_out(int tag) { tags_.at(static_cast<std::size_t>(tag)) = {}; }
@@ -22,10 +23,11 @@ class BoardPattern {
   std::optional<bool> black(double x_m, double y_m) const;
 
  private:
-  explicit BoardPattern(const Board& board) : board_(board) {}
+  BoardPattern(const Board& board, int border) : board_(board), border_(border) {}
 
   Board board_;
-  std::vector<TagCells> tags_;
+  int border_;
+  std::vector<std::optional<TagCells>> tags_;
 };
 
 }  // namespace fbvins

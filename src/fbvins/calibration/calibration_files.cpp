@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/csv.hpp"
 
@@ -35,6 +36,9 @@ std::string matrix(const std::string& name, const Pose<To, From>& T) {
   return out + "  - [0.0, 0.0, 0.0, 1.0]\n";
 }
 
+/// pinhole-radtan, pinhole-radtan5, pinhole-rational.
+bool takes_opencv(const std::string& model) { return model.starts_with("pinhole-ra"); }
+
 std::string basalt_lens(const Camera& camera) {
   const std::array<double, 4> f = camera.intrinsics();
   const std::vector<double> k = camera.distortion();
@@ -45,17 +49,18 @@ std::string basalt_lens(const Camera& camera) {
   if (model == "eucm") add("alpha", k[0]), add("beta", k[1]);
   if (model == "pinhole-equidistant")
     for (int i = 0; i < 4; ++i) add(fmt::format("k{}", i + 1).c_str(), k[i]);
-  if (model == "pinhole-radtan") {
-    add("k1", k[0]), add("k2", k[1]), add("p1", k[2]), add("p2", k[3]);
-    for (int i = 3; i <= 6; ++i) add(fmt::format("k{}", i).c_str(), 0);
-    // Basalt ends the model where it stops growing; 0: it searches for the radius itself.
-    add("rpmax", 0);
-  }
+  if (!takes_opencv(model)) return out;
+  std::vector<double> eight = k;
+  eight.resize(8, 0.0);
+  constexpr const char* kNames[] = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  for (std::size_t i = 0; i < eight.size(); ++i) add(kNames[i], eight[i]);
+  // Basalt ends the model where it stops growing; 0: it searches for the radius itself.
+  add("rpmax", 0);
   return out;
 }
 
 const char* basalt_name(const std::string& model) {
-  if (model == "pinhole-radtan") return "pinhole-radtan8";
+  if (takes_opencv(model)) return "pinhole-radtan8";
   if (model == "pinhole-equidistant") return "kb4";
   return model == "ds" ? "ds" : "eucm";
 }
@@ -173,15 +178,13 @@ Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera) {
   const std::string model = c.model_name();
   if (!model.starts_with("pinhole")) return Error{ErrorCode::unsupported, fmt::format("ROS has no model of {} lenses", model)};
   const std::array<double, 4> f = c.intrinsics();
-  std::vector<double> d = c.distortion();
-  if (model == "pinhole-radtan") d.push_back(0);  // k3
+  const auto [ros_model, d] = opencv_coefficients(c);
   return fmt::format(
       "image_width: {}\nimage_height: {}\ncamera_name: cam{}\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: {}\n"
       "distortion_model: {}\ndistortion_coefficients:\n  rows: 1\n  cols: {}\n  data: {}\n"
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
       "projection_matrix:\n  rows: 3\n  cols: 4\n  data: {}\n",
-      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}),
-      model == "pinhole-radtan" ? "plumb_bob" : "equidistant", d.size(), yaml_list(d),
+      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}), ros_model, d.size(), yaml_list(d),
       yaml_list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
 }
 

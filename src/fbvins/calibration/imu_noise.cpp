@@ -13,7 +13,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kWindow_s = 1;
+constexpr double kAllanWindow_s = 1;
 constexpr double kShortest_s = 20, kComfortable_s = 180;
 constexpr double kMovingGyro_radps = 0.05, kMovingAccel_mps2 = 0.6;  // standard deviations within a window of what does not rest
 constexpr double kTurned_radps = 0.01, kPushed_mps2 = 0.1;           // a window's mean beside that of the one before
@@ -128,7 +128,7 @@ Result<ImuNoiseResult> measure_imu_noise(const std::vector<ImuSample>& readings)
     return refused(
         fmt::format("{:.1f} s of readings are too short for the IMU's noise: {:g} s of rest at least, better several minutes",
                     length_s, kShortest_s));
-  const auto size = static_cast<std::size_t>(std::max(4.0, std::round(kWindow_s / period_s)));
+  const auto size = static_cast<std::size_t>(std::max(4.0, std::round(kAllanWindow_s / period_s)));
   std::vector<Window> windows;
   for (std::size_t i = 0; i + size <= readings.size(); i += size) windows.push_back(window_of(readings, i, i + size));
   if (windows.empty()) return refused("there are too few IMU readings");

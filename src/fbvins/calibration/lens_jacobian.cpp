@@ -17,6 +17,10 @@ void each(Model& m, Visit&& visit) {
     for (auto* value : {&m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
   if constexpr (std::is_same_v<Plain, KannalaBrandt>)
     for (auto* value : {&m.k1, &m.k2, &m.k3, &m.k4}) visit(*value);
+  if constexpr (std::is_same_v<Plain, PinholeRadtan5>)
+    for (auto* value : {&m.k1, &m.k2, &m.p1, &m.p2, &m.k3}) visit(*value);
+  if constexpr (std::is_same_v<Plain, PinholeRational>)
+    for (auto* value : {&m.k1, &m.k2, &m.p1, &m.p2, &m.k3, &m.k4, &m.k5, &m.k6}) visit(*value);
   if constexpr (std::is_same_v<Plain, DoubleSphere>)
     for (auto* value : {&m.xi, &m.alpha}) visit(*value);
   if constexpr (std::is_same_v<Plain, ExtendedUnified>)
@@ -27,6 +31,8 @@ void each(Model& m, Visit&& visit) {
 
 void limit(PinholeRadtan&) {}
 void limit(KannalaBrandt&) {}
+void limit(PinholeRadtan5&) {}
+void limit(PinholeRational&) {}
 void limit(DoubleSphere& m) {
   m.xi = std::clamp(m.xi, -0.999, 0.999);
   m.alpha = std::clamp(m.alpha, 0.0, 1.0);
@@ -68,6 +74,16 @@ UnifiedRadtan bent(const UnifiedRadtan&, const std::vector<double>& v) {
   return {v[0] * e, v[1] * e, v[2], v[3], v[4], k1 * e * e, k2 * std::pow(e, 4), v[7] * e, v[8] * e};
 }
 
+/// The series of N/D in place of N: the coefficients of both trade off against one another.
+std::vector<double> straightened(const PinholeRational& m) {
+  const double c1 = m.k1 - m.k4, c2 = m.k2 - m.k5 - m.k4 * c1, c3 = m.k3 - m.k6 - m.k5 * c1 - m.k4 * c2;
+  return {m.fx, m.fy, m.cx, m.cy, c1, c2, m.p1, m.p2, c3, m.k4, m.k5, m.k6};
+}
+PinholeRational bent(const PinholeRational&, const std::vector<double>& v) {
+  const double c1 = v[4], c2 = v[5], c3 = v[8], k4 = v[9], k5 = v[10], k6 = v[11];
+  return {v[0], v[1], v[2], v[3], c1 + k4, c2 + k5 + k4 * c1, v[6], v[7], c3 + k6 + k5 * c1 + k4 * c2, k4, k5, k6};
+}
+
 template <class Model>
 std::vector<double> straightened(const Model& m) {
   std::vector<double> out;
@@ -103,8 +119,13 @@ void limit_straight(const UnifiedRadtan&, std::vector<double>& v) { v[4] = std::
 void limit_straight(const auto&, std::vector<double>&) {}
 
 std::vector<std::string> own_names(const LensModel& lens) {
-  constexpr const char* kNames[][5] = {
-      {"k1", "k2", "p1", "p2"}, {"k1", "k2", "k3", "k4"}, {"xi", "alpha"}, {"alpha", "beta"}, {"xi", "k1", "k2", "p1", "p2"}};
+  constexpr const char* kNames[][8] = {{"k1", "k2", "p1", "p2"},
+                                       {"k1", "k2", "k3", "k4"},
+                                       {"xi", "alpha"},
+                                       {"alpha", "beta"},
+                                       {"xi", "k1", "k2", "p1", "p2"},
+                                       {"k1", "k2", "p1", "p2", "k3"},
+                                       {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}};
   const int count = lens_parameter_count(lens) - 4;
   return {kNames[lens.index()], kNames[lens.index()] + count};
 }
@@ -118,7 +139,7 @@ std::vector<double> lens_parameters(const LensModel& lens) {
 }
 
 int lens_parameter_count(const LensModel& lens) {
-  constexpr int kCounts[] = {8, 8, 6, 6, 9};
+  constexpr int kCounts[] = {8, 8, 6, 6, 9, 9, 12};
   static_assert(std::size(kCounts) == std::variant_size_v<LensModel>);
   return kCounts[lens.index()];
 }
@@ -169,12 +190,16 @@ LensModel moved_lens(const LensModel& lens, const double* step) {
       lens);
 }
 
-std::vector<std::string> lens_names() { return {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"}; }
+std::vector<std::string> lens_names() {
+  return {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan", "pinhole-radtan5", "pinhole-rational"};
+}
 
 std::optional<LensModel> plain_lens(std::string_view name, double focal_px, const Vec2& centre_px) {
   const double f = focal_px, cx = centre_px.x(), cy = centre_px.y();
   if (name == "pinhole-radtan") return PinholeRadtan{f, f, cx, cy};
   if (name == "pinhole-equidistant") return KannalaBrandt{f, f, cx, cy};
+  if (name == "pinhole-radtan5") return PinholeRadtan5{f, f, cx, cy};
+  if (name == "pinhole-rational") return PinholeRational{f, f, cx, cy};
   if (name == "ds") return DoubleSphere{f, f, cx, cy, 0, 0.5};
   if (name == "eucm") return ExtendedUnified{f, f, cx, cy, 0.5, 1};
   if (name == "omni-radtan") return UnifiedRadtan{2 * f, 2 * f, cx, cy, 1};

@@ -19,8 +19,9 @@ std::vector<std::string> lens_parameter_names(const LensModel& lens);
 LensModel with_parameters(const LensModel& lens, const double* parameters);
 
 /// The parameters in another form, whose errors are nearly those of a linear problem: of ds and omni the focal lengths near the
-/// axis, f / (1 + xi), in place of f, and of omni the coefficients of the whole radial function in place of k1 and k2. The
-/// models' own parameters trade off against one another along a bent valley. The others' as they are.
+/// axis, f / (1 + xi), in place of f, and of omni and the rational model the coefficients of the whole radial function in place
+/// of k1, k2 and, of the latter, k3. The models' own parameters trade off against one another along a bent valley. The others' as
+/// they are.
 std::vector<double> straight_parameters(const LensModel& lens);
 /// d(straight_parameters)/d(parameters).
 Eigen::MatrixXd straight_jacobian(const LensModel& lens);

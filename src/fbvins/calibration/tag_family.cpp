@@ -21,6 +21,16 @@ struct FamilyDeleter {
 };
 using Family = std::unique_ptr<apriltag_family_t, FamilyDeleter>;
 
+/// The library's family describes where in a black square the cells of the pattern are.
+Family family_of(int border) {
+  Family out(tag36h11_create());
+  const int more = border - kLibraryBorder;
+  out->width_at_border += 2 * more, out->total_width += 2 * more;
+  for (uint32_t bit = 0; bit < out->nbits; ++bit)
+    out->bit_x[bit] += static_cast<uint32_t>(more), out->bit_y[bit] += static_cast<uint32_t>(more);
+  return out;
+}
+
 }  // namespace
 
 Result<TagCells> tag_cells(int id) {
@@ -36,11 +46,12 @@ Result<TagCells> tag_cells(int id) {
 }
 
 struct TagDetector::State {
-  Family family{tag36h11_create()};
+  std::vector<Family> families;
   apriltag_detector_t* detector = apriltag_detector_create();
 
-  State() {
-    apriltag_detector_add_family_bits(detector, family.get(), 1);  // one wrong bit is corrected: 11 differ between tags
+  explicit State(const std::vector<int>& borders) {
+    for (const int border : borders)  // one wrong bit is corrected: 11 differ between tags
+      apriltag_detector_add_family_bits(detector, families.emplace_back(family_of(border)).get(), 1);
     detector->quad_decimate = 1;
     detector->nthreads = 1;
   }
@@ -49,7 +60,7 @@ struct TagDetector::State {
   State& operator=(const State&) = delete;
 };
 
-Result<TagDetector> TagDetector::create() { return TagDetector(std::make_unique<State>()); }
+Result<TagDetector> TagDetector::create(const std::vector<int>& borders) { return TagDetector(std::make_unique<State>(borders)); }
 
 namespace {
 
@@ -80,10 +91,13 @@ void detect(apriltag_detector_t* detector, const ImageView& image, std::vector<T
     zarray_get(found, i, &detection);
     TagDetection tag;
     tag.id = detection->id;
+    tag.border = kLibraryBorder + (detection->family->width_at_border - 8) / 2;
+    tag.wrong_cells = detection->hamming;
     for (int k = 0; k < 4; ++k) tag.corners[k] = Vec2(detection->p[k][0] - 0.5, detection->p[k][1] - 0.5);
     // One that was found before in the same place.
     const bool known = std::ranges::any_of(out, [&](const TagDetection& s) {
-      return s.id == tag.id && (s.corners[0] - tag.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
+      return s.id == tag.id && s.border == tag.border &&
+             (s.corners[0] - tag.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
     });
     if (!known) out.push_back(tag);
   }
@@ -98,7 +112,8 @@ std::vector<TagDetection> TagDetector::find(const ImageView& image, int enough) 
   // In a blurred image the tags of a grid hang together at their corners, by the squares between them, and few are found. With
   // black a pixel smaller they come apart; small tags, whose cells would vanish, are found in the image itself.
   detect(state_->detector, with_smaller_black(image).view(), out);
-  if (static_cast<int>(out.size()) < enough) detect(state_->detector, image, out);
+  const auto of_border = [&](int border) { return std::ranges::count(out, border, &TagDetection::border); };
+  if (std::max(of_border(kLibraryBorder), of_border(kKalibrBorder)) < enough) detect(state_->detector, image, out);
   std::ranges::stable_sort(out, {}, &TagDetection::id);
   return out;
 }
@@ -123,11 +138,16 @@ Error not_built() {
 
 struct TagDetector::State {};
 Result<TagCells> tag_cells(int) { return not_built(); }
-Result<TagDetector> TagDetector::create() { return not_built(); }
+Result<TagDetector> TagDetector::create(const std::vector<int>&) { return not_built(); }
 std::vector<TagDetection> TagDetector::find(const ImageView&, int) { return {}; }
 std::vector<TagDetection> TagDetector::find_alone(const ImageView&) { return {}; }
 
 #endif
+
+bool is_black(const TagCells& cells, int border, int row, int column) {
+  const int more = border - kLibraryBorder, r = row - more, c = column - more;
+  return r < 0 || c < 0 || r > 7 || c > 7 || cells[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+}
 
 TagDetector::TagDetector(std::unique_ptr<State> state) : state_(std::move(state)) {}
 TagDetector::TagDetector(TagDetector&&) noexcept = default;

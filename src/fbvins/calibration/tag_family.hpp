@@ -13,14 +13,23 @@
 
 namespace fbvins {
 
-/// 8 x 8 cells, border included, rows from the top; true is black.
+/// Cells of black around the 6 x 6 of a tag's pattern: as libapriltag and OpenCV print tags, and as Kalibr prints an AprilGrid.
+inline constexpr int kLibraryBorder = 1, kKalibrBorder = 2;
+
+/// 8 x 8 cells, a border of one cell included, rows from the top; true is black.
 using TagCells = std::array<std::array<bool, 8>, 8>;
 
 /// The cells of a tag from 0 to 586.
 Result<TagCells> tag_cells(int id);
+/// Cells across a tag with such a border.
+constexpr int cells_across(int border) { return 6 + 2 * border; }
+/// Whether a cell of a tag is black, counted with its border.
+bool is_black(const TagCells& cells, int border, int row, int column);
 
 struct TagDetection {
   int id = 0;
+  int border = kLibraryBorder;  ///< with which it was read
+  int wrong_cells = 0;          ///< of the pattern, 0 or 1
   /// Of the black square: bottom left, bottom right, top right, top left of the upright tag; centre of the first pixel at (0, 0).
   std::array<Vec2, 4> corners;
 };
@@ -28,12 +37,14 @@ struct TagDetection {
 /// One thread at a time.
 class TagDetector {
  public:
-  static Result<TagDetector> create();
+  /// For the borders that tags may have here: one, or both, where they are read with each.
+  static Result<TagDetector> create(const std::vector<int>& borders = {kLibraryBorder});
   TagDetector(TagDetector&&) noexcept;
   TagDetector& operator=(TagDetector&&) noexcept;
   ~TagDetector();
 
-  /// By id; corners to about a pixel. Where fewer than `enough` are found in one way, another one is tried.
+  /// By id; corners to about a pixel. Where fewer than `enough` are found in one way, another one is tried. A tag may be there
+  /// once for each border, and with a wrong number: a border of two cells is read as one of one by luck (grid_tags.hpp).
   std::vector<TagDetection> find(const ImageView& image, int enough);
   /// The same of tags that stand alone, with white around: corners to some tenths of a pixel, where the lines along the edges
   /// meet.

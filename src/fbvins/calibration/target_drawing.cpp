@@ -8,7 +8,6 @@
 #include <optional>
 #include <utility>
 
-#include "fbvins/calibration/tag_family.hpp"
 #include "fbvins/calibration/target_file.hpp"
 
 namespace fbvins {
@@ -43,28 +42,30 @@ bool fits(const Board& board, const Vec2& page) {
 }
 
 /// White cells of a tag over its black square; neighbours in a row are one rectangle.
-Result<void> draw_tag(int id, double left, double top, double size, Drawing& out) {
+Result<void> draw_tag(int id, int border, double left, double top, double size, Drawing& out) {
   const Result<TagCells> cells = tag_cells(id);
   if (!cells) return cells.error();
   out.rectangles.push_back({left, top, size, size});
-  const double cell = size / 8;
-  for (int row = 0; row < 8; ++row)
-    for (int from = 0, to = 0; from < 8; from = to + 1) {
-      for (to = from; to < 8 && !(*cells)[row][to];) ++to;
+  const int across = cells_across(border);
+  const double cell = size / across;
+  for (int row = 0; row < across; ++row)
+    for (int from = 0, to = 0; from < across; from = to + 1) {
+      for (to = from; to < across && !is_black(*cells, border, row, to);) ++to;
       if (to > from) out.rectangles.push_back({left + from * cell, top + row * cell, (to - from) * cell, cell, false});
     }
   return {};
 }
 
 /// Tag 0 at the bottom left, rows upwards; a black square in each crossing of the gaps makes every corner of a tag a saddle.
-Result<void> draw_aprilgrid(const Board& board, double left, double top, Drawing& out) {
+Result<void> draw_aprilgrid(const Board& board, int border, double left, double top, Drawing& out) {
   const double size = 1e3 * board.size_m, gap = board.spacing * size, pitch = size + gap;
   for (int row = 0; row <= board.rows; ++row)
     for (int column = 0; column <= board.columns; ++column)
       out.rectangles.push_back({left + column * pitch, top + row * pitch, gap, gap});
   for (int tag = 0; tag < board.columns * board.rows; ++tag) {
     const int column = tag % board.columns, row = board.rows - 1 - tag / board.columns;
-    if (Result<void> drawn = draw_tag(tag, left + gap + column * pitch, top + gap + row * pitch, size, out); !drawn) return drawn;
+    if (Result<void> drawn = draw_tag(tag, border, left + gap + column * pitch, top + gap + row * pitch, size, out); !drawn)
+      return drawn;
   }
   out.origin_mm = {left + gap, top + board.rows * pitch};
   return {};
@@ -80,7 +81,8 @@ Result<void> draw_squares(const Board& board, double left, double top, Drawing& 
       const double x = left + column * size, y = top + row * size;
       if ((row + column) % 2 == 0) out.rectangles.push_back({x, y, size, size});
       else if (tags)
-        if (Result<void> drawn = draw_tag(tag++, x + inset, y + inset, board.spacing * size, out); !drawn) return drawn;
+        if (Result<void> drawn = draw_tag(tag++, kLibraryBorder, x + inset, y + inset, board.spacing * size, out); !drawn)
+          return drawn;
     }
   out.origin_mm = {left + size, top + size};
   return {};
@@ -123,7 +125,7 @@ double largest_size_m(Board board, std::string_view paper) {
   return 1e-3 * std::max({0.0, largest(room_mm(*page)), largest(room_mm({page->y(), page->x()}))});
 }
 
-Result<Drawing> draw_target(const Board& board, std::string_view paper) {
+Result<Drawing> draw_target(const Board& board, std::string_view paper, int border) {
   if (std::string problem = impossible(board); !problem.empty()) return Error{ErrorCode::invalid_argument, problem};
   const auto upright = paper_mm(paper);
   if (!upright)
@@ -137,8 +139,8 @@ Result<Drawing> draw_target(const Board& board, std::string_view paper) {
                     extent.x(), extent.y(), paper, room.x(), room.y(), largest_size_m(board, paper))};
   Drawing out{page.x(), page.y(), {}, {}, Vec2::Zero()};
   const double left = kMargin_mm + kRuler_mm + 0.5 * (room.x() - extent.x()), top = kMargin_mm + 0.5 * (room.y() - extent.y());
-  if (Result<void> drawn =
-          board.kind == BoardKind::aprilgrid ? draw_aprilgrid(board, left, top, out) : draw_squares(board, left, top, out);
+  if (Result<void> drawn = board.kind == BoardKind::aprilgrid ? draw_aprilgrid(board, border, left, top, out)
+                                                              : draw_squares(board, left, top, out);
       !drawn)
     return drawn.error();
   draw_rulers(board.describe(), out);

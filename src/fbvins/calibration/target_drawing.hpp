@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fbvins/calibration/board.hpp"
+#include "fbvins/calibration/tag_family.hpp"
 #include "fbvins/core/result.hpp"
 
 namespace fbvins {
@@ -36,7 +37,8 @@ struct Drawing {
 /// The largest whole number of millimetres for Board::size_m with which the board fits on the paper, as metres; 0 if none does.
 double largest_size_m(Board board, std::string_view paper);
 /// Paper: A4, A3, A2, A1, A0, turned where the board fits better. An error for another name, or a board that does not fit.
-Result<Drawing> draw_target(const Board& board, std::string_view paper);
+/// The tags of an AprilGrid have a border of so many cells, those of a ChArUco board one.
+Result<Drawing> draw_target(const Board& board, std::string_view paper, int border = kKalibrBorder);
 
 std::string to_pdf(const Drawing& drawing);
 std::string to_svg(const Drawing& drawing);

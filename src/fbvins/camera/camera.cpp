@@ -157,7 +157,8 @@ Camera Camera::turned(const Mat3& R_lens) const {
 
 std::string Camera::model_name() const {
   if (lens_) return lens_->name();
-  constexpr const char* kNames[] = {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"};
+  constexpr const char* kNames[] = {"pinhole-radtan",  "pinhole-equidistant", "ds", "eucm", "omni-radtan",
+                                    "pinhole-radtan5", "pinhole-rational"};
   static_assert(std::size(kNames) == std::variant_size_v<LensModel>);
   return kNames[model_.index()];
 }

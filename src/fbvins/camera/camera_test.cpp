@@ -18,6 +18,11 @@ Camera euroc_like() {
   return {PinholeRadtan{458.654, 457.296, 367.215, 248.375, -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}, 752, 480};
 }
 Camera fisheye() { return {KannalaBrandt{190.98, 190.97, 254.93, 256.90, 0.0034, 0.00072, -0.0020, 0.00020}, 512, 512}; }
+// Like a RealSense's colour camera by plumb_bob, an OAK's by the rational model.
+Camera with_k3() { return {PinholeRadtan5{434.1, 433.2, 321.7, 238.5, -0.055, 0.066, -3e-4, 6e-4, -0.021}, 640, 480}; }
+Camera rational() {
+  return {PinholeRational{505.0, 505.2, 321.0, 243.5, 0.52, -2.44, 4e-4, -1e-4, 1.42, 0.40, -2.26, 1.35}, 640, 480};
+}
 Camera strong_barrel() { return {PinholeRadtan{300, 310, 320, 240, -0.3, 0.0, 0.001, -0.002}, 640, 480}; }
 
 void expect_round_trip_over_image(const Camera& cam, double border_px, double max_distance_px) {
@@ -35,6 +40,10 @@ void expect_round_trip_over_image(const Camera& cam, double border_px, double ma
 }
 
 TEST(Camera, EveryPixelOfEurocImageUndistortsAndComesBack) { expect_round_trip_over_image(euroc_like(), 20, 1e9); }
+TEST(Camera, EveryPixelOfLensesWithMoreCoefficientsComesBack) {
+  expect_round_trip_over_image(with_k3(), 20, 1e9);
+  expect_round_trip_over_image(rational(), 20, 1e9);
+}
 TEST(Camera, FisheyePixelsWithinItsCircleUndistortAndComeBack) {
   expect_round_trip_over_image(fisheye(), 0, 1.45 * 190);  // 83 degrees
   EXPECT_FALSE(fisheye().undistort({0, 0}));               // the corners look backwards: no x/z, y/z
@@ -42,7 +51,7 @@ TEST(Camera, FisheyePixelsWithinItsCircleUndistortAndComeBack) {
 
 TEST(Camera, RandomRaysComeBack) {
   Rng rng(5);
-  for (const Camera& cam : {euroc_like(), fisheye(), strong_barrel()}) {
+  for (const Camera& cam : {euroc_like(), fisheye(), strong_barrel(), with_k3(), rational()}) {
     for (int i = 0; i < 2000; ++i) {
       const double angle = rng.uniform(0, 6.28);
       const double radius = rng.uniform(0, 0.95 * std::min(cam.max_normalised_radius(), 4.0));
@@ -56,7 +65,7 @@ TEST(Camera, RandomRaysComeBack) {
 
 TEST(Camera, JacobianIsTheDerivativeOfDistort) {
   Rng rng(6);
-  for (const Camera& cam : {euroc_like(), fisheye(), strong_barrel()}) {
+  for (const Camera& cam : {euroc_like(), fisheye(), strong_barrel(), with_k3(), rational()}) {
     for (int i = 0; i < 500; ++i) {
       // every tenth point lies so near to the axis that the series is used
       const double scale = i % 10 == 0 ? 1e-5 : 0.8;

@@ -24,13 +24,22 @@ KalibrCamera kalibr_camera(const Camera& camera) {
   const std::string name = camera.model_name();
   if (name == "ds" || name == "eucm") return {name, joined(2), "none", {}};
   if (name == "omni-radtan") return {"omni", joined(1), "radtan", {k.begin() + 1, k.end()}};
-  return {"pinhole", joined(0), name == "pinhole-radtan" ? "radtan" : "equidistant", k};
+  // The longer ones, which Kalibr does not have, by ROS's names.
+  const char* distortion = name == "pinhole-radtan"     ? "radtan"
+                           : name == "pinhole-radtan5"  ? "plumb_bob"
+                           : name == "pinhole-rational" ? "rational_polynomial"
+                                                        : "equidistant";
+  return {"pinhole", joined(0), distortion, k};
 }
 
 std::optional<LensModel> lens_of(std::string_view model_name, const std::array<double, 4>& f, const std::vector<double>& k) {
   if (!(f[0] > 0 && f[1] > 0)) return std::nullopt;
   if (model_name == "pinhole-radtan" && k.size() == 4) return PinholeRadtan{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3]};
   if (model_name == "pinhole-equidistant" && k.size() == 4) return KannalaBrandt{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3]};
+  if (model_name == "pinhole-radtan5" && k.size() == 5)
+    return PinholeRadtan5{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3], k[4]};
+  if (model_name == "pinhole-rational" && k.size() == 8)
+    return PinholeRational{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]};
   if (model_name == "ds" && k.size() == 2 && outside_of_model("ds", k).empty())
     return DoubleSphere{f[0], f[1], f[2], f[3], k[0], k[1]};
   if (model_name == "eucm" && k.size() == 2 && outside_of_model("eucm", k).empty())

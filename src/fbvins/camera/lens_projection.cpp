@@ -10,12 +10,13 @@ namespace fbvins {
 namespace {
 
 using Row23 = Eigen::Matrix<double, 2, 3>;
+using OwnJacobian = Eigen::Matrix<double, 2, kMostLensParameters - 4>;
 
 /// A point on the model's plane, before focal lengths and centre.
 struct Unit {
   Vec2 uv;
   Row23 J_point;
-  Eigen::Matrix<double, 2, 5> J_own = Eigen::Matrix<double, 2, 5>::Zero();  ///< of the parameters after cy
+  OwnJacobian J_own = OwnJacobian::Zero();  ///< of the parameters after cy
 };
 
 /// (u, v) = (x, y) / D with the derivatives of D; `first` to `own` of D's own parameters.
@@ -46,6 +47,40 @@ std::optional<Unit> unit(const PinholeRadtan& m, const Vec3& p) {
   out.uv = brown(m, out.uv, J, J_own);
   out.J_point = (J * out.J_point).eval();
   out.J_own.leftCols<4>() = J_own;
+  return out;
+}
+
+/// Of k1, k2, p1, p2, k3, and of a rational model k4, k5, k6.
+template <LongBrown Model>
+OwnJacobian own_derivatives(const Model& m, const Vec2& n) {
+  const double x = n.x(), y = n.y(), s = n.squaredNorm();
+  const auto D = [&] {
+    if constexpr (requires { m.k4; }) return 1.0 + s * (m.k4 + s * (m.k5 + s * m.k6));
+    else return 1.0;
+  }();
+  OwnJacobian J = OwnJacobian::Zero();
+  J.col(0) = s / D * n;
+  J.col(1) = s * s / D * n;
+  J.col(2) << 2 * x * y, s + 2 * y * y;
+  J.col(3) << s + 2 * x * x, 2 * x * y;
+  J.col(4) = s * s * s / D * n;
+  if constexpr (requires { m.k4; }) {
+    const double a = scaling(m, s).a;
+    double power = 1;
+    for (int k = 5; k < 8; ++k) J.col(k) = -a * (power *= s) / D * n;
+  }
+  return J;
+}
+
+template <LongBrown Model>
+std::optional<Unit> unit(const Model& m, const Vec3& p) {
+  if (!(p.z() > 1e-3 * p.norm())) return std::nullopt;
+  Unit out = quotient(p, p.z(), Vec3::UnitZ(), {});
+  if (!(radial(m, out.uv.norm()).derivative > 0)) return std::nullopt;
+  Mat2 J;
+  out.J_own = own_derivatives(m, out.uv);
+  out.uv = distort_unit(m, out.uv, &J);
+  out.J_point = (J * out.J_point).eval();
   return out;
 }
 
@@ -99,7 +134,7 @@ std::optional<Unit> unit(const UnifiedRadtan& m, const Vec3& p) {
   out.uv = brown(second, out.uv, J, J_own);
   out.J_point = (J * out.J_point).eval();
   out.J_own.col(0) = (J * out.J_own.col(0)).eval();
-  out.J_own.rightCols<4>() = J_own;
+  out.J_own.middleCols<4>(1) = J_own;
   return out;
 }
 
@@ -117,7 +152,7 @@ std::optional<Vec2> project_point(const LensModel& lens, const Vec3& p_C, LensDe
           derivatives->parameters(0, 0) = point->uv.x();
           derivatives->parameters(1, 1) = point->uv.y();
           derivatives->parameters(0, 2) = derivatives->parameters(1, 3) = 1;
-          derivatives->parameters.rightCols<5>() = focal.asDiagonal() * point->J_own;
+          derivatives->parameters.rightCols<kMostLensParameters - 4>() = focal.asDiagonal() * point->J_own;
         }
         return Vec2(m.fx * point->uv.x() + m.cx, m.fy * point->uv.y() + m.cy);
       },

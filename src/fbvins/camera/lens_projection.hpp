@@ -10,7 +10,7 @@
 
 namespace fbvins {
 
-inline constexpr int kMostLensParameters = 9;
+inline constexpr int kMostLensParameters = 12;
 
 struct LensDerivatives {
   Eigen::Matrix<double, 2, 3> point;                         ///< d(pixel)/d(p_C)

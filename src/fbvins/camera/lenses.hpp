@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "fbvins/camera/lens_models.hpp"
@@ -73,6 +74,39 @@ struct Scaling {
   double a;
   double b;
 };
+
+/// The radial part of Brown's distortion with more than two coefficients: a = N/D.
+inline Scaling scaling(const PinholeRadtan5& m, double s) {
+  return {1.0 + s * (m.k1 + s * (m.k2 + s * m.k3)), 2.0 * (m.k1 + s * (2.0 * m.k2 + s * 3.0 * m.k3))};
+}
+
+inline Scaling scaling(const PinholeRational& m, double s) {
+  const double N = 1.0 + s * (m.k1 + s * (m.k2 + s * m.k3)), D = 1.0 + s * (m.k4 + s * (m.k5 + s * m.k6));
+  if (!(D > 0)) return {0, 0};  // beyond a pole; a derivative of zero ends the model's domain in Camera
+  const double dN = m.k1 + s * (2.0 * m.k2 + s * 3.0 * m.k3), dD = m.k4 + s * (2.0 * m.k5 + s * 3.0 * m.k6);
+  return {N / D, 2.0 * (dN * D - N * dD) / (D * D)};
+}
+
+template <class Model>
+concept LongBrown = std::is_same_v<Model, PinholeRadtan5> || std::is_same_v<Model, PinholeRational>;
+
+template <LongBrown Model>
+Radial radial(const Model& m, double r) {
+  const Scaling f = scaling(m, r * r);
+  return {f.a * r, f.a + f.b * r * r};
+}
+
+template <LongBrown Model>
+Vec2 distort_unit(const Model& m, const Vec2& n, Mat2* J) {
+  const double x = n.x(), y = n.y(), xy = x * y, s = n.squaredNorm();
+  const Scaling f = scaling(m, s);
+  if (J) {
+    const double off_diagonal = f.b * xy + 2.0 * m.p1 * x + 2.0 * m.p2 * y;
+    *J << f.a + f.b * x * x + 2.0 * m.p1 * y + 6.0 * m.p2 * x, off_diagonal,  //
+        off_diagonal, f.a + f.b * y * y + 6.0 * m.p1 * y + 2.0 * m.p2 * x;
+  }
+  return {f.a * x + 2.0 * m.p1 * xy + m.p2 * (s + 2.0 * x * x), f.a * y + m.p1 * (s + 2.0 * y * y) + 2.0 * m.p2 * xy};
+}
 
 inline Radial radial_of(const Scaling& f, double r) { return {f.a * r, f.a + f.b * r * r}; }
 
@@ -172,6 +206,8 @@ inline Vec3 ray_before_distortion(const UnifiedRadtan& m, const Vec2& uv) {
 
 inline std::vector<double> coefficients(const PinholeRadtan& m) { return {m.k1, m.k2, m.p1, m.p2}; }
 inline std::vector<double> coefficients(const KannalaBrandt& m) { return {m.k1, m.k2, m.k3, m.k4}; }
+inline std::vector<double> coefficients(const PinholeRadtan5& m) { return {m.k1, m.k2, m.p1, m.p2, m.k3}; }
+inline std::vector<double> coefficients(const PinholeRational& m) { return {m.k1, m.k2, m.p1, m.p2, m.k3, m.k4, m.k5, m.k6}; }
 inline std::vector<double> coefficients(const DoubleSphere& m) { return {m.xi, m.alpha}; }
 inline std::vector<double> coefficients(const ExtendedUnified& m) { return {m.alpha, m.beta}; }
 inline std::vector<double> coefficients(const UnifiedRadtan& m) { return {m.xi, m.k1, m.k2, m.p1, m.p2}; }

@@ -42,7 +42,7 @@ Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const Imu
 
 /// Kalibr's camchain-imucam.yaml; imu_noise stays at its defaults.
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read = {});
-/// Kalibr's imu.yaml, with or without the `imu0:` level.
-Result<ImuNoise> parse_kalibr_imu(YamlReader yaml);
+/// Kalibr's imu.yaml, with or without the level of the IMU's name.
+Result<ImuNoise> parse_kalibr_imu(YamlReader yaml, const std::string& name = "imu0");
 
 }  // namespace fbvins

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/image_decode.hpp"
 
 namespace fbvins {
@@ -17,7 +19,7 @@ int read_side(YamlReader& yaml, const YAML::Node& map, double value) {
   return 1;
 }
 
-/// Four coefficients; complains about other lengths, unless all after the fourth are zero.
+/// Four coefficients of Brown's distortion behind a mirror; complains about other lengths, unless all after the fourth are zero.
 std::vector<double> read_coefficients(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
   std::vector<double> k = yaml.numbers(map, field);
   if (k.size() != 4 && !(k.size() > 4 && std::all_of(k.begin() + 4, k.end(), [](double x) { return x == 0; })))
@@ -76,14 +78,21 @@ RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, con
   Mat3 R;
   R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
   // Hand-typed matrices carry three or four digits.
-  constexpr double kTolerance = 1e-3;
-  if (!((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kTolerance) || !(R.determinant() > 0))
-    yaml.complain(map, field, "its 3x3 part is not a rotation");
+  constexpr double kTolerance = 3e-3, kExact = 1e-3;
+  const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
+  if (!(off < kTolerance))
+    yaml.complain(map, field,
+                  fmt::format("its 3x3 part is not a rotation: its columns are not of length 1 and "
+                              "orthogonal by up to {:.2g}",
+                              off));
+  else if (!(R.determinant() > 0)) yaml.complain(map, field, "its 3x3 part is not a rotation, but mirrors");
   else if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) yaml.complain(map, field, "its last row is not 0 0 0 1");
   const Vec3 p(m[3], m[7], m[11]);
   if (!(p.cwiseAbs().maxCoeff() < 1e3)) yaml.complain(map, field, "its translation is more than a kilometre");
   if (!yaml.ok()) return {};
-  return {Quat(R).normalized(), p};
+  if (off < kExact) return {Quat(R).normalized(), p};
+  const Eigen::JacobiSVD<Mat3> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);  // the nearest rotation
+  return {Quat(Mat3(svd.matrixU() * svd.matrixV().transpose())).normalized(), p};
 }
 
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read) {
@@ -100,26 +109,32 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
   const std::vector<double> size = yaml.numbers(map, "resolution", 2);
   const int width = read_side(yaml, map, size[0]), height = read_side(yaml, map, size[1]);
   const std::string distortion = yaml.word(map, "distortion_model");
-  const bool none = distortion == "none", radtan = distortion == "radial-tangential" || distortion == "radtan",
-             equidistant = distortion == "equidistant";
-  const bool known = none || (radtan && (model == "pinhole" || model == "omni")) || (equidistant && model == "pinhole");
+  const DistortionKind kind = distortion_kind(distortion);
+  const bool none = kind == DistortionKind::none, equidistant = kind == DistortionKind::equidistant;
+  const bool known =
+      none || (kind == DistortionKind::brown && (model == "pinhole" || model == "omni")) || (equidistant && model == "pinhole");
   if (!known)
     yaml.complain(map, "distortion_model",
                   fmt::format("'{}' is not supported, only {}", distortion,
-                              model == "pinhole" ? "radial-tangential, radtan, equidistant and none"
+                              model == "pinhole" ? "radtan (plumb_bob, rational_polynomial), equidistant (fisheye) and none"
                               : model == "omni"  ? "radtan and none"
                                                  : "none"));
+  if (model == "pinhole" && known && yaml.ok()) {
+    const std::vector<double> k = none ? std::vector<double>{} : yaml.numbers(map, coefficients_field);
+    const std::array<double, 4> focal{f[0], f[1], f[2], f[3]};
+    Result<Camera> camera = equidistant ? fisheye_camera(focal, k, width, height) : opencv_camera(focal, k, width, height);
+    if (yaml.ok() && !camera) yaml.complain(map, coefficients_field, camera.error().message);
+    if (!yaml.ok()) return {};
+    camera->set_mask(read_mask(yaml, map, *camera, read));
+    return *camera;
+  }
   const std::vector<double> k =
       none || !yaml.ok() ? std::vector<double>(4, 0.0) : read_coefficients(yaml, map, coefficients_field);
   if (const std::string problem = yaml.ok() ? outside_of_model(model, own) : ""; !problem.empty())
     yaml.complain(map, "intrinsics", problem);
   if (!yaml.ok()) return {};
-  own.insert(own.end(), model == "omni" || model == "pinhole" ? k.begin() : k.end(), k.end());
-  const std::string name = model == "omni"      ? "omni-radtan"
-                           : model != "pinhole" ? model
-                           : equidistant        ? "pinhole-equidistant"
-                                                : "pinhole-radtan";
-  Camera camera(*lens_of(name, {f[0], f[1], f[2], f[3]}, own), width, height);
+  own.insert(own.end(), model == "omni" ? k.begin() : k.end(), k.end());
+  Camera camera(*lens_of(model == "omni" ? "omni-radtan" : model, {f[0], f[1], f[2], f[3]}, own), width, height);
   camera.set_mask(read_mask(yaml, map, camera, read));
   return camera;
 }

@@ -132,7 +132,8 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
             "c.yaml:14: cam1: is empty");
   EXPECT_EQ(message("T_cam_imu", "T_imu_cam"), "c.yaml:2: T_cam_imu: is missing");
   EXPECT_EQ(message("distortion_model: equidistant", "distortion_model: fov"),
-            "c.yaml:10: distortion_model: 'fov' is not supported, only radial-tangential, radtan, equidistant and none");
+            "c.yaml:10: distortion_model: 'fov' is not supported, only radtan (plumb_bob, "
+            "rational_polynomial), equidistant (fisheye) and none");
   EXPECT_EQ(message("[752, 480]", "[752.5, 480]"), "c.yaml:12: resolution: 752.5 is not a number of pixels");
   EXPECT_EQ(message("458.6", "none"), "c.yaml:11: intrinsics: holds something that is not a number");
   EXPECT_EQ(message("0.0, 0.0, 0.0, 1.0", "0.0, 0.0, 0.5, 1.0"), "c.yaml:3: T_cam_imu: its last row is not 0 0 0 1");

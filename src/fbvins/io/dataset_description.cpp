@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -71,6 +72,7 @@ void describe(DatasetContents& contents) {
   info.longest_image_gap_start = images.longest_start;
   warn_about_gap(images, "images", info.warnings);
   describe_imu(contents.imu, info);
+  for (std::string& doubt : calibration_doubts(contents.rig)) info.warnings.push_back(std::move(doubt));
 }
 
 void warn_of_silent_cameras(DatasetContents& contents) {

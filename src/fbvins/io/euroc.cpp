@@ -10,6 +10,7 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -150,8 +151,26 @@ class EurocReader {
     const auto& path = options_.kalibr_imu;
     Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path), imu.noise);
     if (!rig) return rig.error();
+    const std::vector<std::string> rostopics = rostopics_of(options_.kalibr_camchain);
+    std::vector<std::string> folders;
+    for (int i = 0; i < rig->camera_count(); ++i) folders.push_back(fmt::format("cam{}", i));
+    if (rig->camera_count() == 1 && !rostopics.empty()) take_only(rostopics.front());
+    if (const auto order = order_by_topics(rostopics, folders); !order.empty()) {
+      warn(order_sentence(options_.kalibr_camchain, order));
+      rig = in_order(*rig, order);
+    }
     take(*rig);
     return {};
+  }
+
+  /// A calibration of one camera that names another folder than the first is that one's.
+  void take_only(const std::string& rostopic) {
+    const auto named = [&](int camera) { return names_camera(rostopic, fmt::format("cam{}", camera)); };
+    const auto found = std::ranges::find_if(cameras_, named);
+    if (found == cameras_.end() || found == cameras_.begin()) return;
+    cameras_ = {*found};
+    warn(
+        fmt::format("{}: its camera is cam{} by its rostopic, which is flown alone", options_.kalibr_camchain, cameras_.front()));
   }
 
   /// A calibration from outside, whose cameras have the numbers of the folders; one of a single camera is that of the first

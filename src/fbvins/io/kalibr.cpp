@@ -8,6 +8,8 @@
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/foreign_files.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 
 namespace fbvins {
 namespace {
@@ -41,8 +43,8 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
   return rig;
 }
 
-Result<ImuNoise> parse_kalibr_imu(YamlReader yaml) {
-  const YAML::Node nested = yaml.get(yaml.root(), "imu0");
+Result<ImuNoise> parse_kalibr_imu(YamlReader yaml, const std::string& name) {
+  const YAML::Node nested = yaml.get(yaml.root(), name);
   const ImuNoise noise = read_imu_noise(yaml, nested.IsDefined() ? nested : yaml.root(), "update_rate");
   if (!yaml.ok()) return yaml.error();
   return noise;
@@ -52,17 +54,14 @@ Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optio
                               const ImuNoise& otherwise) {
   Result<std::string> camchain = read_file(camchain_path, kLargestYaml_bytes);
   if (!camchain) return camchain.error();
+  if (const std::string other = camchain->find("cam0:") == std::string::npos ? foreign_file(*camchain) : ""; !other.empty())
+    return Error{ErrorCode::unsupported, fmt::format("{}: {}", camchain_path, other)};
   Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *camchain}, files_beside(camchain_path));
   if (!rig) return rig;
   rig->imu_noise = otherwise;
   const YamlReader same_file(camchain_path, *camchain);
   if (!imu_path && !same_file.has(same_file.root(), "imu0")) return rig;
-  Result<std::string> imu = imu_path ? read_file(*imu_path, kLargestYaml_bytes) : *std::move(camchain);
-  if (!imu) return imu.error();
-  Result<ImuNoise> noise = parse_kalibr_imu({imu_path.value_or(camchain_path), *std::move(imu)});
-  if (!noise) return noise.error();
-  rig->imu_noise = *noise;
-  return rig;
+  return imu_path ? with_imu_file(*rig, *imu_path) : with_imu_text(*rig, camchain_path, *camchain, "");
 }
 
 }  // namespace fbvins

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/cdr.hpp"
 
 namespace fbvins {
@@ -93,12 +94,8 @@ void append_depth_image(std::string& out, Time t, std::string_view frame, const 
 }
 
 RosLens ros_lens(const Camera& camera) {
-  std::string name = camera.model_name();
-  std::vector<double> k = camera.distortion();
-  if (name == "pinhole-equidistant") return {"equidistant", std::move(k)};
-  if (name != "pinhole-radtan") return {std::move(name), std::move(k)};
-  k.push_back(0.0);  // k3
-  return {"plumb_bob", std::move(k)};
+  OpencvCoefficients lens = opencv_coefficients(camera);
+  return {std::move(lens.ros_model), std::move(lens.values)};
 }
 
 void append_camera_info(std::string& out, Time t, std::string_view frame, const Camera& camera) {

@@ -52,7 +52,8 @@ std::vector<Px4Parameter> px4_parameters(const Px4VisionSetup& setup) {
             setup.gps ? "position, height and velocity from GPS beside vision"
                       : "beside GPS the heading of a frame that is not north-aligned is not fused"),
       whole("EKF2_BARO_CTRL", setup.barometer ? 1 : 0,
-            setup.barometer ? "outdoors, at height" : "indoors a barometer jumps with doors and propellers"),
+            setup.barometer ? "a height for when vision fails: Altitude mode and landing need it"
+                            : "without a barometer a loss of vision is a loss of the height, too"),
   };
   if (!setup.compass) {
     out.push_back(whole("EKF2_MAG_TYPE", 5, "heading from vision alone", kReboot));

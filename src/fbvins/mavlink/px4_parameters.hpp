@@ -2,7 +2,7 @@
 // Private: the parameters with which PX4 fuses our poses (docs/px4.md), as a file to load and as sentences about those of a
 // vehicle. Pure functions.
 //
-//   write(px4_parameter_file({.barometer = true}));
+//   write(px4_parameter_file({.gps = true}));
 //   for (const Px4Finding& finding : judge_px4({}, values)) print(finding.sentence);
 #pragma once
 
@@ -16,7 +16,7 @@ enum class Px4Link { none, serial, ethernet };  ///< none: the simulator, or set
 
 struct Px4VisionSetup {
   bool gps = false, compass = false;  ///< fused beside vision
-  bool barometer = false;             ///< outdoors, at height
+  bool barometer = true;              ///< a second height, for when vision fails
   Px4Link link = Px4Link::none;
   int system_id = 1;  ///< live.mavlink.system_id
 };

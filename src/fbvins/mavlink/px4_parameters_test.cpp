@@ -16,7 +16,7 @@ std::map<std::string, double> as_wanted(const Px4VisionSetup& setup) {
 
 TEST(Px4Parameters, AVehicleThatHasTheFileLoadedIsRight) {
   for (const Px4VisionSetup& setup : {Px4VisionSetup{},
-                                      {.gps = true, .compass = true, .barometer = true},
+                                      {.gps = true, .compass = true, .barometer = false},
                                       {.link = Px4Link::serial, .system_id = 7},
                                       {.link = Px4Link::ethernet}})
     EXPECT_TRUE(judge_px4(setup, as_wanted(setup)).empty());
@@ -38,6 +38,12 @@ TEST(Px4Parameters, WhatIsWrongIsOneSentenceWithTheReason) {
   EXPECT_NE(found[2].sentence.find("EKF2_DELAY_MAX is 110, and should be at least 200"), std::string::npos);
   EXPECT_FALSE(found[3].wrong);
   EXPECT_NE(found[3].sentence.find("live.mavlink.mounting counts from the vehicle's origin"), std::string::npos);
+}
+
+TEST(Px4Parameters, ThereIsAHeightWhenVisionFails) {
+  EXPECT_EQ(as_wanted({})["EKF2_HGT_REF"], 3) << "vision's, while there is vision";
+  EXPECT_EQ(as_wanted({})["EKF2_BARO_CTRL"], 1);
+  EXPECT_EQ(as_wanted({.barometer = false})["EKF2_BARO_CTRL"], 0);
 }
 
 TEST(Px4Parameters, TheFileHasARowForEach) {

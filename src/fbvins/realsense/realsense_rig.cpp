@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/realsense/realsense_camera.hpp"
 
 namespace fbvins {
@@ -20,12 +21,11 @@ Result<Camera> camera_of(const rs2_intrinsics& lens, const std::string& which) {
     return Camera(KannalaBrandt{lens.fx, lens.fy, lens.ppx, lens.ppy, k[0], k[1], k[2], k[3]}, lens.width, lens.height);
   // The infrared images of the D400 family are rectified: whatever the model is called, its coefficients are zero.
   const bool straight = std::all_of(std::begin(lens.coeffs), std::end(lens.coeffs), [](float c) { return c == 0; });
-  const bool brown = lens.model == RS2_DISTORTION_BROWN_CONRADY && k[4] == 0;
-  if (!straight && !brown)
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{}: its distortion ({}, fifth coefficient {}) is not supported; calibrate with Kalibr", which,
-                             rs2_distortion_to_string(lens.model), k[4])};
-  return Camera(PinholeRadtan{lens.fx, lens.fy, lens.ppx, lens.ppy, k[0], k[1], k[2], k[3]}, lens.width, lens.height);
+  if (!straight && lens.model != RS2_DISTORTION_BROWN_CONRADY)
+    return Error{ErrorCode::unsupported, fmt::format("{}: its distortion ({}) is not supported; calibrate with Kalibr", which,
+                                                     rs2_distortion_to_string(lens.model))};
+  return opencv_camera({lens.fx, lens.fy, lens.ppx, lens.ppy}, {std::begin(lens.coeffs), std::end(lens.coeffs)}, lens.width,
+                       lens.height);
 }
 
 /// In the library's convention: the rotation column by column, p_to = R * p_from + t.

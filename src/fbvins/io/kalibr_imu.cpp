@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/kalibr_imu.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "fbvins/camera/check_rig.hpp"
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/file_source.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kMostImus = 8;
+
+/// Where an IMU is, by the fields that Kalibr writes beside its noise.
+struct ImuPlace {
+  std::string name, topic;
+  Pose<B, B> T_IB;  ///< from Kalibr's body
+  double time_offset_s = 0;
+};
+
+ImuPlace read_place(YamlReader& yaml, const YAML::Node& map, const std::string& name) {
+  ImuPlace out{name, yaml.has(map, "rostopic") ? yaml.text(map, "rostopic") : "", {}, 0};
+  if (yaml.has(map, "T_i_b")) out.T_IB = read_transform<B, B>(yaml, map, "T_i_b");
+  if (yaml.has(map, "time_offset")) out.time_offset_s = yaml.number_between(map, "time_offset", -10, 10, 0);
+  return out;
+}
+
+bool same(const ImuPlace& a, const ImuPlace& b) {
+  constexpr double kSame_m = 1e-9, kSame_s = 1e-9;
+  return (a.T_IB.p - b.T_IB.p).norm() < kSame_m && (a.T_IB.q.conjugate() * b.T_IB.q).vec().norm() < kSame_m &&
+         std::abs(a.time_offset_s - b.time_offset_s) < kSame_s;
+}
+
+/// The one that was asked for; without that the only one, or the first of those in one place.
+std::optional<ImuPlace> chosen(YamlReader& yaml, const std::string& which) {
+  const YAML::Node& root = yaml.root();
+  std::vector<ImuPlace> all;
+  for (int i = 0; i < kMostImus; ++i)
+    if (const std::string name = fmt::format("imu{}", i); yaml.has(root, name))
+      all.push_back(read_place(yaml, yaml.get(root, name), name));
+  if (all.empty()) all.push_back(read_place(yaml, root, ""));
+  if (!yaml.ok()) return std::nullopt;
+  if (!which.empty()) {
+    const auto found = std::ranges::find(all, which, &ImuPlace::name);
+    if (found != all.end()) return *found;
+    yaml.complain(root, which, "is not there");
+    return std::nullopt;
+  }
+  if (std::ranges::all_of(all, [&](const ImuPlace& imu) { return same(imu, all.front()); })) return all.front();
+  std::vector<std::string> named;
+  for (const ImuPlace& imu : all) named.push_back(imu.topic.empty() ? imu.name : fmt::format("{} ({})", imu.name, imu.topic));
+  yaml.complain(root, "imu",
+                fmt::format("there are several in different places, {}: say which one was recorded by a name behind the file's, "
+                            "--imu-calibration {}:{}",
+                            fmt::join(named, " and "), yaml.file(), all.back().name));
+  return std::nullopt;
+}
+
+StereoRig seen_from(const StereoRig& rig, const ImuPlace& imu) {
+  StereoRig out = rig;
+  const Pose<B, B>& T = imu.T_IB;
+  out.T_BC0 = T * rig.T_BC0, out.T_BC1 = T * rig.T_BC1;
+  for (MountedCamera& camera : out.more) camera.T_BC = T * camera.T_BC;
+  if (out.depth && out.depth->own) out.depth->own->T_BC = T * out.depth->own->T_BC;
+  out.time_offset_s = rig.time_offset_s - imu.time_offset_s;
+  return out;
+}
+
+/// imu_utils: the averages of three axes. Its "white noise" is that of Kalibr's density for the rate of 1 Hz that its older
+/// versions assume; newer ones give it times the root of the rate, which they do not write: the larger figure is the safe one.
+/// Its bias instability stands for the random walk.
+ImuNoise imu_utils_noise(YamlReader& yaml) {
+  ImuNoise noise;
+  const auto figure = [&](const char* sensor, const char* name) {
+    return yaml.positive(yaml.get(yaml.get(yaml.root(), sensor), "avg-axis"), name);
+  };
+  noise.gyro_noise_density_radps_rthz = figure("Gyr", "gyr_n");
+  noise.gyro_random_walk_radps2_rthz = figure("Gyr", "gyr_w");
+  noise.accel_noise_density_mps2_rthz = figure("Acc", "acc_n");
+  noise.accel_random_walk_mps3_rthz = figure("Acc", "acc_w");
+  return noise;
+}
+
+}  // namespace
+
+Result<StereoRig> with_imu_text(const StereoRig& rig, const std::string& file, const std::string& text,
+                                const std::string& which) {
+  YamlReader yaml(file, text);
+  if (!yaml.ok()) return yaml.error();
+  if (yaml.has(yaml.root(), "Gyr") && yaml.has(yaml.root(), "Acc")) {
+    StereoRig out = rig;
+    out.imu_noise = imu_utils_noise(yaml);
+    if (!yaml.ok()) return yaml.error();
+    return out;
+  }
+  const std::optional<ImuPlace> imu = chosen(yaml, which);
+  if (!imu) return yaml.error();
+  const Result<ImuNoise> noise = parse_kalibr_imu({file, text}, imu->name.empty() ? "imu0" : imu->name);
+  if (!noise) return noise.error();
+  StereoRig out = same(*imu, {}) ? rig : seen_from(rig, *imu);
+  out.imu_noise = *noise;
+  if (Result<void> good = check_rig(out, file); !good) return good.error();
+  return out;
+}
+
+Result<StereoRig> with_imu_file(const StereoRig& rig, const std::string& name) {
+  std::string path = name, which;
+  std::error_code ignored;
+  if (const std::size_t at = name.rfind(":imu"); at != std::string::npos && !std::filesystem::exists(name, ignored))
+    path = name.substr(0, at), which = name.substr(at + 1);
+  const Result<std::string> text = read_file(path, kLargestYaml_bytes);
+  if (!text) return text.error();
+  return with_imu_text(rig, path, *text, which);
+}
+
+}  // namespace fbvins
