@@ -25,9 +25,7 @@ bool holds(const std::string& text, const char* word) { return text.find(word) !
 
 Result<StereoRig> with_imu(Result<StereoRig> rig, const std::string& imu_path) {
   if (!rig || imu_path.empty()) return rig;
-  const Result<std::string> text = read_file(imu_path, kLargestYaml_bytes);
-  if (!text) return text.error();
-  const Result<ImuNoise> noise = parse_kalibr_imu({imu_path, *text});
+  const Result<ImuNoise> noise = load_imu(imu_path, rig->imu_noise);
   if (!noise) return noise.error();
   rig->imu_noise = *noise;
   return rig;

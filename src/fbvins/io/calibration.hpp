@@ -42,7 +42,8 @@ Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const Imu
 
 /// Kalibr's camchain-imucam.yaml; imu_noise stays at its defaults.
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read = {});
-/// Kalibr's imu.yaml, with or without the `imu0:` level.
-Result<ImuNoise> parse_kalibr_imu(YamlReader yaml);
+/// Kalibr's or OpenVINS' imu.yaml, with or without the `imu0:` level. RealSense's JSON of an IMU has axes alone: the rest is
+/// `otherwise`.
+Result<ImuNoise> parse_imu(YamlReader yaml, const ImuNoise& otherwise = {});
 
 }  // namespace fbvins

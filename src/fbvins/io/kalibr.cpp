@@ -8,6 +8,7 @@
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -41,7 +42,12 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
   return rig;
 }
 
-Result<ImuNoise> parse_kalibr_imu(YamlReader yaml) {
+Result<ImuNoise> parse_imu(YamlReader yaml, const ImuNoise& otherwise) {
+  if (is_realsense_imu(yaml)) {
+    ImuNoise noise = otherwise;
+    noise.axes = read_realsense_imu(yaml);
+    return yaml.ok() ? Result<ImuNoise>(noise) : yaml.error();
+  }
   const YAML::Node nested = yaml.get(yaml.root(), "imu0");
   const ImuNoise noise = read_imu_noise(yaml, nested.IsDefined() ? nested : yaml.root(), "update_rate");
   if (!yaml.ok()) return yaml.error();
@@ -59,10 +65,16 @@ Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optio
   if (!imu_path && !same_file.has(same_file.root(), "imu0")) return rig;
   Result<std::string> imu = imu_path ? read_file(*imu_path, kLargestYaml_bytes) : *std::move(camchain);
   if (!imu) return imu.error();
-  Result<ImuNoise> noise = parse_kalibr_imu({imu_path.value_or(camchain_path), *std::move(imu)});
+  Result<ImuNoise> noise = parse_imu({imu_path.value_or(camchain_path), *std::move(imu)}, otherwise);
   if (!noise) return noise.error();
   rig->imu_noise = *noise;
   return rig;
+}
+
+Result<ImuNoise> load_imu(const std::string& path, const ImuNoise& otherwise) {
+  const Result<std::string> text = read_file(path, kLargestYaml_bytes);
+  if (!text) return text.error();
+  return parse_imu({path, *text}, otherwise);
 }
 
 }  // namespace fbvins
