@@ -52,7 +52,7 @@ bool same_calibration(const StereoRig& a, const StereoRig& b) {
   if (a.camera_count() != b.camera_count()) return false;
   for (int k = 0; k < a.camera_count(); ++k)
     if (a.camera(k).model_name() != b.camera(k).model_name()) return false;
-  return values(flight_rig(a)).isApprox(values(flight_rig(b)), 1e-9);
+  return a.imu_noise.axes == b.imu_noise.axes && values(flight_rig(a)).isApprox(values(flight_rig(b)), 1e-9);
 }
 
 }  // namespace

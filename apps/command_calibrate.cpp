@@ -116,9 +116,7 @@ Result<void> set_sizes(const std::vector<std::string>& texts, Detections& detect
 /// The IMU's noise that is given, if it is.
 Result<std::optional<ImuNoise>> given_noise(const Arguments& a) {
   if (a.imu_calibration.empty()) return std::optional<ImuNoise>();
-  Result<std::string> text = read_file(a.imu_calibration, 1u << 20u);
-  if (!text) return text.error();
-  Result<ImuNoise> noise = parse_kalibr_imu({a.imu_calibration, *text});
+  Result<ImuNoise> noise = load_imu(a.imu_calibration);
   if (!noise) return noise.error();
   return std::optional(*noise);
 }

@@ -10,13 +10,14 @@
 #include "apps/mocap_report.hpp"
 #include "apps/open_recording.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/eval/misreading.hpp"
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV), a recording with
+    R"(GROUND_TRUTH is a trajectory file (TUM's, EuRoC's, those of VINS-Mono, VINS-Fusion, ORB-SLAM3 and OpenVINS), a recording with
 ground truth, of which the share of images with a pose is printed as well, or a bag with a topic of PoseStamped,
 TransformStamped or Odometry; ESTIMATE is a trajectory file or such a bag. The stamps of both are matched as by evo:
 the nearest, at most --max-diff apart.
@@ -30,7 +31,7 @@ examples:
 )";
 
 struct Arguments {
-  std::string truth, estimate, alignment = "se3", pairs = "all", path = "truth", topic;
+  std::string truth, estimate, format, alignment = "se3", pairs = "all", path = "truth", topic;
   double max_difference_s = 0.01;
   bool interpolate = false, json = false, hand_eye = false;
 };
@@ -86,13 +87,18 @@ EvaluationOptions options_of(const Arguments& arguments) {
 }
 
 int evaluate_files(const Arguments& arguments) {
-  const auto estimate = open_poses(arguments.estimate, "");
+  const Result<TrajectoryFormat> format = parse_trajectory_format(arguments.format);
+  if (!format) return fail("--format: " + format.error().message);
+  const auto estimate =
+      arguments.format.empty() ? open_poses(arguments.estimate, "") : read_pose_file(arguments.estimate, *format);
   if (!estimate) return fail(estimate.error().message);
   const auto truth =
       arguments.hand_eye ? read_markers_as_truth(arguments.truth, *estimate) : read_truth(arguments.truth, arguments.topic);
   if (!truth) return fail(truth.error().message);
   const EvaluationOptions options = options_of(arguments);
-  const auto evaluation = evaluate(truth->poses, *estimate, options);
+  const Misreading misread = find_misreading(truth->poses, *estimate, options.association);
+  if (!misread.said.empty()) note(fmt::format("{}: {}, as the truth shows, and is read so", arguments.estimate, misread.said));
+  const auto evaluation = evaluate(truth->poses, misread.estimate, options);
   if (!evaluation) return fail(evaluation.error().message);
   std::optional<Coverage> coverage;
   if (!truth->images.empty()) {
@@ -102,6 +108,7 @@ int evaluate_files(const Arguments& arguments) {
   }
   if (arguments.json) {
     Json json = to_json(*evaluation, options.alignment);
+    json["found_by_truth"] = misread.said;
     if (coverage) json["coverage"] = to_json(*coverage);
     fmt::print("{}\n", json.dump(2));
     return kOk;
@@ -120,6 +127,8 @@ void add_eval_command(CLI::App& program, int& exit_code) {
   command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();
   command->add_option("--topic", arguments->topic, "topic of poses, if GROUND_TRUTH is a bag with several");
+  command->add_option("--format", arguments->format,
+                      "how ESTIMATE is written, where that is found wrongly: ns, us, ms or s, and wxyz or xyzw, such as us,wxyz");
   command->add_option("--align", arguments->alignment, "alignment of the estimate with the truth, before errors are computed")
       ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))
       ->capture_default_str();

@@ -3,6 +3,8 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -11,6 +13,7 @@
 #include "apps/recording_report.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/bags/bag_survey.hpp"
+#include "fbvins/core/angle.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -62,6 +65,29 @@ std::string times_of(const StereoRig& rig) {
   return out;
 }
 
+/// Noise and what the calibration knows of scale, axes and biases.
+void print_imu_calibration(const ImuNoise& imu) {
+  fmt::print("{:<14}noise {:.3g} rad/s and {:.3g} m/s^2 per sqrt(Hz), random walk {:.3g} rad/s^2 and {:.3g} m/s^3\n", "",
+             imu.gyro_noise_density_radps_rthz, imu.accel_noise_density_mps2_rthz, imu.gyro_random_walk_radps2_rthz,
+             imu.accel_random_walk_mps3_rthz);
+  const ImuIntrinsics& axes = imu.axes;
+  if (axes == ImuIntrinsics{}) {
+    fmt::print("{:<14}no scale and axes in the calibration: readings are taken as they are\n", "");
+    return;
+  }
+  const auto off = [](const Mat3& m) {
+    const Vec3 scale = (m.transpose() * m).diagonal().cwiseSqrt();
+    const Mat3 cosines = scale.cwiseInverse().asDiagonal() * (m.transpose() * m) * scale.cwiseInverse().asDiagonal();
+    return fmt::format("scale {:.4f} {:.4f} {:.4f}, axes up to {:.2f} degrees from square", scale.x(), scale.y(), scale.z(),
+                       kDegreesPerRad * std::asin(std::min(1.0, (cosines - Mat3::Identity()).cwiseAbs().maxCoeff())));
+  };
+  const Vec3 &bg = axes.bias.gyro_radps, &ba = axes.bias.accel_mps2;
+  fmt::print("{:<14}gyroscope: {}, bias {:.4f} {:.4f} {:.4f} rad/s{}\n", "", off(axes.gyro), bg.x(), bg.y(), bg.z(),
+             axes.gyro_by_force.isZero(0) ? "" : fmt::format(", up to {:.4f} rad/s for each m/s^2",
+                                                             axes.gyro_by_force.cwiseAbs().maxCoeff()));
+  fmt::print("{:<14}accelerometer: {}, bias {:.4f} {:.4f} {:.4f} m/s^2\n", "", off(axes.accel), ba.x(), ba.y(), ba.z());
+}
+
 void print_text(const Dataset& data) {
   const DatasetInfo& info = data.info();
   fmt::print("{} ({})\n", bold(info.name), info.format);
@@ -79,6 +105,7 @@ void print_text(const Dataset& data) {
   fmt::print("{:<14}{}{}\n", "rig", baseline, times_of(data.rig()));
   fmt::print("{:<14}{} samples at {:.1f} Hz, longest gap {:.3f} s, {} rows left out\n", "imu", info.imu_samples, info.imu_rate_hz,
              info.longest_imu_gap.seconds(), info.imu_rows.bad());
+  print_imu_calibration(data.rig().imu_noise);
   fmt::print("{:<14}{} poses\n", "ground truth", info.ground_truth_poses);
 }
 

@@ -38,6 +38,9 @@ Json to_json(const Evaluation& e, Alignment alignment) {
   json["rpe_per_second_m"] = to_json(e.per_second_m);
   json["rpe_per_second_deg"] = to_json(e.per_second_deg);
   json["largest_excursion_m"] = e.largest_excursion_m;
+  json["truth"] = Json{{"share", e.truth_share},
+                       {"longest_gap_s", e.longest_truth_gap_s},
+                       {"end_drift_m", e.end_drift_m ? Json(*e.end_drift_m) : Json(nullptr)}};
   return json;
 }
 
@@ -63,6 +66,10 @@ std::string to_table(const Evaluation& e, Alignment alignment) {
   text += row("relative per metre [deg]", e.per_metre_deg);
   text += row("relative per 1 s [m]", e.per_second_m);
   text += row("relative per 1 s [deg]", e.per_second_deg);
+  if (e.longest_truth_gap_s > 0)
+    text += fmt::format("truth for {:.1f} % of the estimate's time, longest gap {:.2f} s: the errors above say nothing of the rest\n",
+                        100 * e.truth_share, e.longest_truth_gap_s);
+  if (e.end_drift_m) text += fmt::format("drift at the end, aligned before the first gap: {:.4f} m\n", *e.end_drift_m);
   return text;
 }
 

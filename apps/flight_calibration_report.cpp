@@ -31,11 +31,11 @@ struct ReadableUnit {
   double factor;
   const char* name;
 };
-ReadableUnit readable(const std::string& unit, bool flown) {
+ReadableUnit readable(const std::string& unit) {
   if (unit == "rad") return {1 / kDegree, "degrees"};
   if (unit == "m") return {1e3, "mm"};
   if (unit == "s") return {1e3, "ms"};
-  return !flown ? ReadableUnit{100, "%"} : ReadableUnit{1, unit.c_str()};
+  return unit.empty() ? ReadableUnit{100, "%"} : ReadableUnit{1, unit.c_str()};
 }
 
 std::string names_of(const FlightCalibration& found, FlightFinding finding) {
@@ -60,9 +60,9 @@ std::string flight_calibration_text(const FlightCalibration& found) {
   if (!found.better && !names_of(found, FlightFinding::refined).empty()) out += "what all flights ask for, which is not taken:\n";
   for (const RefinedParameter& p : found.parameters) {
     if (p.finding != FlightFinding::refined) continue;
-    const ReadableUnit unit = readable(p.unit, p.flown);
-    out += fmt::format("  {:<12} {:>12.4f} {:>+11.4f} +- {:<9.4f} {}{}\n", p.name, unit.factor * p.value, unit.factor * p.change,
-                       unit.factor * p.sigma, unit.name, p.flown ? "" : " (in no file of a rig)");
+    const ReadableUnit unit = readable(p.unit);
+    out += fmt::format("  {:<12} {:>12.4f} {:>+11.4f} +- {:<9.4f} {}\n", p.name, unit.factor * p.value, unit.factor * p.change,
+                       unit.factor * p.sigma, unit.name);
   }
   if (const std::string names = names_of(found, FlightFinding::confirmed); !names.empty())
     out += fmt::format("as given, which these flights confirm: {}\n", names);
@@ -91,8 +91,7 @@ std::string flight_calibration_json(const FlightCalibration& found, const std::v
                                  {"sigma", p.sigma},
                                  {"prior_sigma", p.prior_sigma},
                                  {"finding", word(p.finding)},
-                                 {"unit", p.unit},
-                                 {"in_files", p.flown}};
+                                 {"unit", p.unit}};
   for (Eigen::Index row = 0; row < found.covariance.rows(); ++row)
     out["covariance"].push_back(std::vector<double>(found.covariance.col(row).begin(), found.covariance.col(row).end()));
   out["held_out"] = Json::array();

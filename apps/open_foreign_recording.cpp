@@ -14,7 +14,7 @@ RecordingOptions options_of(const RecordingArguments& arguments, const DatasetOp
   with.duration_s = arguments.duration_s;
   with.camera = arguments.camera;
   with.pair_tolerance_ms = arguments.pair_tolerance_ms;
-  return {with, arguments.calibration, arguments.imu_calibration, arguments.topics};
+  return {with, arguments.calibration, arguments.imu_calibration, arguments.topics, arguments.by_recording};
 }
 
 }  // namespace

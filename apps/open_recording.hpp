@@ -11,6 +11,7 @@
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/io/trajectory.hpp"
 #include "fbvins/types/trajectory.hpp"
 
 namespace CLI {
@@ -26,6 +27,7 @@ namespace fbvins::app {
 struct RecordingArguments {
   std::string path, calibration, imu_calibration;
   std::vector<std::string> topics;     ///< of a bag: those of the cameras, of the IMU and of depth images
+  bool by_recording = false;           ///< of a bag: RecordingOptions
   double start_s = 0, duration_s = 0;  ///< DatasetOptions
   std::string camera = "all";          ///< the same
   double pair_tolerance_ms = DatasetOptions{}.pair_tolerance_ms;
@@ -50,8 +52,8 @@ class RecordingWarnings {
 /// program reads none.
 std::optional<BagSurvey> survey_recording(const RecordingArguments& arguments);
 
-/// A TUM or EuRoC file; warns of rows that are left out.
-Result<Trajectory<W>> read_pose_file(const std::string& path);
+/// A trajectory file; says how an unusual one was read, and warns of rows that are left out.
+Result<Trajectory<W>> read_pose_file(const std::string& path, const TrajectoryFormat& format = {});
 /// The poses of a file: TUM or EuRoC; in fbvins-bags also of a bag, from `topic` or its only topic of poses.
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic);
 

@@ -52,6 +52,23 @@ Json more_json(const StereoRig& rig, const CameraInfo& info) {
   return out;
 }
 
+Json rows_json(const Mat3& m) {
+  Json out = Json::array();
+  for (int row = 0; row < 3; ++row) out.push_back({m(row, 0), m(row, 1), m(row, 2)});
+  return out;
+}
+
+/// Scale and axes, where the calibration has them; none: null.
+Json axes_json(const ImuIntrinsics& axes) {
+  if (axes == ImuIntrinsics{}) return {};
+  const Vec3 &bg = axes.bias.gyro_radps, &ba = axes.bias.accel_mps2;
+  return Json{{"gyro", rows_json(axes.gyro)},
+              {"accel", rows_json(axes.accel)},
+              {"gyro_by_force", rows_json(axes.gyro_by_force)},
+              {"gyro_bias_radps", {bg.x(), bg.y(), bg.z()}},
+              {"accel_bias_mps2", {ba.x(), ba.y(), ba.z()}}};
+}
+
 }  // namespace
 
 Json describe(const Dataset& data) {
@@ -72,7 +89,8 @@ Json describe(const Dataset& data) {
                      {"gyro_noise_density_radps_rthz", rig.imu_noise.gyro_noise_density_radps_rthz},
                      {"accel_noise_density_mps2_rthz", rig.imu_noise.accel_noise_density_mps2_rthz},
                      {"gyro_random_walk_radps2_rthz", rig.imu_noise.gyro_random_walk_radps2_rthz},
-                     {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz}};
+                     {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz},
+                     {"axes", axes_json(rig.imu_noise.axes)}};
   json["left"] = camera_json(rig, 0, info.left);
   if (rig.has_right()) json["right"] = camera_json(rig, 1, info.right);
   if (!rig.more.empty()) json["more"] = more_json(rig, info.more);

@@ -22,6 +22,14 @@ ImuNoise noise_of(const CalibrationMaterial& material, std::vector<std::string>&
   return noise;
 }
 
+/// The readings as the given axes correct them; as they are where the axes are estimated.
+std::vector<ImuSample> readings_of(const CalibrationMaterial& material, const ImuNoise& noise, bool estimated) {
+  std::vector<ImuSample> out = material.imu;
+  if (!estimated)
+    for (ImuSample& reading : out) reading = corrected(reading, noise.axes);
+  return out;
+}
+
 class RigSolver {
  public:
   RigSolver(const Board& board, const CalibrationMaterial& material, const CameraCalibrationOptions& cameras,
@@ -78,7 +86,8 @@ class RigSolver {
 
   Result<void> mount_on_imu() {
     ImuCameraInput input{
-        board_, {}, {}, material_.detections.views, material_.imu, outcome_.imu_noise, rig_variations(outcome_.cameras)};
+        board_, {}, {}, material_.detections.views, readings_of(material_, outcome_.imu_noise, imu_options_.imu_axes),
+        outcome_.imu_noise, rig_variations(outcome_.cameras)};
     for (const CalibratedCamera& camera : outcome_.cameras.cameras) {
       input.cameras.push_back(camera.camera);
       if (!apart_) input.T_CnC0.push_back(camera.T_CnC0);

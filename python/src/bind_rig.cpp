@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras, IMU and how they are joined.
 #include <fmt/format.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/variant.h>
@@ -124,24 +125,65 @@ void bind_camera(nb::module_& m) {
 }
 
 void bind_sensors(nb::module_& m) {
+  const auto matrix = [](const std::vector<std::vector<double>>& rows, const char* name) {
+    Mat3 out;
+    if (rows.size() != 3) throw nb::value_error(fmt::format("{} is not a matrix of 3 rows", name).c_str());
+    for (int i = 0; i < 3; ++i) {
+      if (rows[i].size() != 3) throw nb::value_error(fmt::format("{} is not a matrix of 3 columns", name).c_str());
+      for (int j = 0; j < 3; ++j) out(i, j) = rows[i][j];
+    }
+    return out;
+  };
+  const auto rows = [](const Mat3& m) {
+    std::vector<std::vector<double>> out(3);
+    for (int i = 0; i < 3; ++i) out[i] = {m(i, 0), m(i, 1), m(i, 2)};
+    return out;
+  };
+  nb::class_<ImuIntrinsics>(m, "ImuIntrinsics",
+                            "Scale and axes of an IMU: it reads gyro @ rate + gyro_by_force @ force + gyro_bias, accel @ force + "
+                            "accel_bias.")
+      .def(
+          "__init__",
+          [matrix](ImuIntrinsics* self, const std::vector<std::vector<double>>& gyro,
+                   const std::vector<std::vector<double>>& accel, const std::vector<std::vector<double>>& gyro_by_force,
+                   std::array<double, 3> gyro_bias, std::array<double, 3> accel_bias) {
+            ImuIntrinsics axes{matrix(gyro, "gyro"), matrix(accel, "accel"), matrix(gyro_by_force, "gyro_by_force"),
+                               {Vec3(gyro_bias.data()), Vec3(accel_bias.data())}};
+            if (const Result<void> good = check_imu({.axes = axes}, "axes"); !good)
+              throw nb::value_error(good.error().message.c_str());
+            new (self) ImuIntrinsics(axes);
+          },
+          nb::kw_only(), "gyro"_a = rows(Mat3::Identity()), "accel"_a = rows(Mat3::Identity()),
+          "gyro_by_force"_a = rows(Mat3::Zero()), "gyro_bias"_a = std::array<double, 3>{},
+          "accel_bias"_a = std::array<double, 3>{})
+      .def_prop_ro("gyro", [rows](const ImuIntrinsics& a) { return rows(a.gyro); })
+      .def_prop_ro("accel", [rows](const ImuIntrinsics& a) { return rows(a.accel); })
+      .def_prop_ro("gyro_by_force", [rows](const ImuIntrinsics& a) { return rows(a.gyro_by_force); }, "rad/s for each m/s^2")
+      .def_prop_ro("gyro_bias", [](const ImuIntrinsics& a) { return std::array{a.bias.gyro_radps.x(), a.bias.gyro_radps.y(), a.bias.gyro_radps.z()}; }, "rad/s")
+      .def_prop_ro("accel_bias", [](const ImuIntrinsics& a) { return std::array{a.bias.accel_mps2.x(), a.bias.accel_mps2.y(), a.bias.accel_mps2.z()}; }, "m/s^2");
+
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")
       .def(
           "__init__",
-          [](ImuNoise* self, double gyro, double accel, double gyro_walk, double accel_walk, double rate_hz) {
+          [](ImuNoise* self, double gyro, double accel, double gyro_walk, double accel_walk, double rate_hz,
+             const ImuIntrinsics* axes) {
             for (const double figure : {gyro, accel, gyro_walk, accel_walk, rate_hz})
               if (!(figure > 0 && std::isfinite(figure)))
                 throw nb::value_error("noise densities, random walks and the rate are positive");
-            new (self) ImuNoise{gyro, accel, gyro_walk, accel_walk, rate_hz};
+            ImuNoise imu{gyro, accel, gyro_walk, accel_walk, rate_hz};
+            if (axes != nullptr) imu.axes = *axes;
+            new (self) ImuNoise(imu);
           },
           nb::kw_only(), "gyro_noise_density"_a = ImuNoise{}.gyro_noise_density_radps_rthz,
           "accel_noise_density"_a = ImuNoise{}.accel_noise_density_mps2_rthz,
           "gyro_random_walk"_a = ImuNoise{}.gyro_random_walk_radps2_rthz,
-          "accel_random_walk"_a = ImuNoise{}.accel_random_walk_mps3_rthz, "rate_hz"_a = ImuNoise{}.rate_hz)
+          "accel_random_walk"_a = ImuNoise{}.accel_random_walk_mps3_rthz, "rate_hz"_a = ImuNoise{}.rate_hz, "axes"_a.none() = nb::none())
       .def_ro("gyro_noise_density", &ImuNoise::gyro_noise_density_radps_rthz, "rad/s/sqrt(Hz)")
       .def_ro("accel_noise_density", &ImuNoise::accel_noise_density_mps2_rthz, "m/s^2/sqrt(Hz)")
       .def_ro("gyro_random_walk", &ImuNoise::gyro_random_walk_radps2_rthz, "rad/s^2/sqrt(Hz)")
       .def_ro("accel_random_walk", &ImuNoise::accel_random_walk_mps3_rthz, "m/s^3/sqrt(Hz)")
-      .def_ro("rate_hz", &ImuNoise::rate_hz);
+      .def_ro("rate_hz", &ImuNoise::rate_hz)
+      .def_ro("axes", &ImuNoise::axes, "scale and axes");
 
   nb::class_<DepthSensor>(
       m, "DepthSensor",

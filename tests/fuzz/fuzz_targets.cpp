@@ -173,7 +173,7 @@ void fuzz_calibration(std::string_view bytes) {
   require_sentence(rig);
   if (rig) require_rigid(rig->T_BC0);
   if (rig) require_rigid(rig->T_BC1);
-  require_sentence(parse_kalibr_imu(yaml));
+  require_sentence(parse_imu(yaml));
 }
 
 void fuzz_trajectory(std::string_view bytes) {

@@ -6,6 +6,8 @@
 //   if (e) fmt::print("ATE RMSE {} m\n", e->absolute_m.rmse);
 #pragma once
 
+#include <optional>
+
 #include "fbvins/eval/alignment.hpp"
 #include "fbvins/eval/relative_error.hpp"
 #include "fbvins/eval/statistics.hpp"
@@ -28,9 +30,13 @@ struct Evaluation {
   ErrorStatistics per_metre_m, per_metre_deg;
   ErrorStatistics per_second_m, per_second_deg;
   double largest_excursion_m = 0;  ///< of the estimate from its first pose: drift where the truth is at rest
+  double truth_share = 1;          ///< of the time between the estimate's first and last pose: where there is truth
+  double longest_truth_gap_s = 0;  ///< of that time, at its ends too; absolute errors say nothing of it
+  /// Where the truth has a gap: how far the estimate is from it at the end, aligned before the gap alone (poses, no scale).
+  std::optional<double> end_drift_m;
 };
 
-/// Trajectories of any frames. An error when no poses can be associated or they do not determine the alignment.
+/// Trajectories of any frames. Relative errors are not formed across a gap of the truth. An error when no poses can be associated or they do not determine the alignment.
 Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options);
 
 /// |p_estimate - p_truth| of each pair, m.

@@ -35,7 +35,7 @@ struct DatasetOptions {
   int prefetch_frames = 8;            ///< decoded ahead; 0: decode when asked, without a thread
   bool require_imu = true;            ///< false: a recording without imu0 is fine
   std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
-  std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
+  std::string kalibr_imu = "";        ///< replaces its IMU's noise and axes
   std::optional<StereoRig> rig = {};  ///< replaces both
   bool scale_lenses = false;          ///< where images are larger or smaller than the calibration's, but of the same shape
   std::string camera = "all";         ///< or the first two: "both", or one of these: "left", "right"; the left one with "depth"
@@ -53,7 +53,7 @@ struct DatasetOptions {
     v("prefetch_frames", prefetch_frames, "", "stereo frames decoded ahead on another thread", 0, 1000);
     v("require_imu", require_imu, "", "refuse recordings without IMU");
     v("kalibr_camchain", kalibr_camchain, "", "camchain-imucam.yaml that replaces the recording's calibration");
-    v("kalibr_imu", kalibr_imu, "", "imu.yaml that replaces the recording's IMU noise");
+    v("kalibr_imu", kalibr_imu, "", "imu.yaml that replaces noise and axes of the recording's IMU");
     v("camera", camera, "all|both|left|right|depth",
       "the cameras that are used: all, the first two, one of these, or the left one with its depth images");
   }

@@ -20,4 +20,7 @@ namespace fbvins {
 Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path = std::nullopt,
                               const ImuNoise& otherwise = {});
 
+/// The IMU alone: noise and axes of Kalibr's or OpenVINS' imu.yaml; of RealSense's JSON the axes, and the rest is `otherwise`.
+Result<ImuNoise> load_imu(const std::string& path, const ImuNoise& otherwise = {});
+
 }  // namespace fbvins

@@ -30,6 +30,7 @@ struct TrajectoryFile {
   std::vector<TrajectoryPoint> points;  ///< in order of time
   RowCounts counts;                     ///< what was left out
   int without_pose = 0;                 ///< rows of an odometry CSV whose health says that there is no pose
+  std::string recognised;               ///< how the file is written, for people; empty for plain TUM and EuRoC files
 
   /// In the frame that the caller names; the file does not say.
   template <class Frame = W>
@@ -41,10 +42,19 @@ struct TrajectoryFile {
   }
 };
 
-/// Told apart by content: commas mean EuRoC's CSV (ns, p, q wxyz[, v, gyro bias, accelerometer bias[, ...]]),
-/// blanks mean TUM (s, p, q xyzw). `file` is only for messages.
-Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file);
-Result<TrajectoryFile> read_trajectory(const std::string& path);
+/// What a file does not say itself, or says wrongly.
+struct TrajectoryFormat {
+  double unit_ns = 0;                        ///< of the stamps; 0: by their size
+  std::optional<bool> w_first = std::nullopt;  ///< quaternions are w x y z, or x y z w; none: by the rest
+};
+/// "ns", "us", "ms" or "s" and "wxyz" or "xyzw", one of them or both with a comma between.
+Result<TrajectoryFormat> parse_trajectory_format(const std::string& text);
+
+/// Told apart by content: commas and whole stamps mean EuRoC's CSV (ns, p, q wxyz[, v[, gyro bias, accelerometer bias[, ...]]]),
+/// blanks mean TUM (s, p, q xyzw[, ...]); other units of the stamps, separators, a running number and columns that follow are
+/// recognised, and told in TrajectoryFile::recognised. Rows with NaN are counted and left out. `file` is only for messages.
+Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file, const TrajectoryFormat& format = {});
+Result<TrajectoryFile> read_trajectory(const std::string& path, const TrajectoryFormat& format = {});
 
 /// `t x y z qx qy qz qw`, seconds with nine decimals.
 class TumWriter {

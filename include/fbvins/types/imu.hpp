@@ -34,7 +34,43 @@ struct ImuSegment {
   bool empty() const { return samples.size() < 2; }
 };
 
-/// An IMU as in calibration files: continuous-time noise, rate, and range.
+struct ImuBias {
+  Vec3 gyro_radps = Vec3::Zero();
+  Vec3 accel_mps2 = Vec3::Zero();
+};
+
+/// Scale and axes of an IMU: what it reads of an angular rate w and a specific force f, both in B,
+///   gyroscope = gyro * w + gyro_by_force * f + bias.gyro_radps,  accelerometer = accel * f + bias.accel_mps2.
+/// `bias` is the calibration's, constant; what is left of it, and moves, is estimated in flight.
+struct ImuIntrinsics {
+  Mat3 gyro = Mat3::Identity(), accel = Mat3::Identity();
+  Mat3 gyro_by_force = Mat3::Zero();  ///< rad/s of a gyroscope for each m/s^2 ("g-sensitivity")
+  ImuBias bias = {};
+  bool operator==(const ImuIntrinsics& o) const {
+    return gyro == o.gyro && accel == o.accel && gyro_by_force == o.gyro_by_force && bias.gyro_radps == o.bias.gyro_radps &&
+           bias.accel_mps2 == o.bias.accel_mps2;
+  }
+};
+
+/// What the reading means, by this calibration of its axes; the same bits where that says nothing.
+inline ImuSample corrected(const ImuSample& reading, const ImuIntrinsics& axes) {
+  if (axes == ImuIntrinsics{}) return reading;
+  const Vec3 force = axes.accel.inverse() * (reading.accel_mps2 - axes.bias.accel_mps2);
+  return {reading.t, axes.gyro.inverse() * (reading.gyro_radps - axes.bias.gyro_radps - axes.gyro_by_force * force), force};
+}
+
+/// The axes of an IMU whose readings, corrected by `given`, still read by `found`.
+inline ImuIntrinsics followed_by(const ImuIntrinsics& given, const ImuIntrinsics& found) {
+  ImuIntrinsics out;
+  out.gyro = given.gyro * found.gyro;
+  out.accel = given.accel * found.accel;
+  out.gyro_by_force = given.gyro * found.gyro_by_force + given.gyro_by_force * found.accel;
+  out.bias.gyro_radps = given.gyro * found.bias.gyro_radps + given.gyro_by_force * found.bias.accel_mps2 + given.bias.gyro_radps;
+  out.bias.accel_mps2 = given.accel * found.bias.accel_mps2 + given.bias.accel_mps2;
+  return out;
+}
+
+/// An IMU as in calibration files: continuous-time noise, rate, range, and axes.
 struct ImuNoise {
   double gyro_noise_density_radps_rthz = 1.6968e-4;
   double accel_noise_density_mps2_rthz = 2.0e-3;
@@ -43,11 +79,7 @@ struct ImuNoise {
   double rate_hz = 200;
   double max_gyro_radps = 36.7;  ///< a larger number cannot be a reading of this sensor; 2000 deg/s and 5 %
   double max_accel_mps2 = 185;   ///< likewise; 18 g and 5 %
-};
-
-struct ImuBias {
-  Vec3 gyro_radps = Vec3::Zero();
-  Vec3 accel_mps2 = Vec3::Zero();
+  ImuIntrinsics axes = {};       ///< applied to readings once, where ImuHistory takes them
 };
 
 }  // namespace fbvins

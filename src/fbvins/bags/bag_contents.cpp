@@ -28,8 +28,8 @@ std::string realsense_stream(const std::string& topic) {
   return end == std::string::npos ? "" : topic.substr(0, end);
 }
 
-void take_imu(const BagMessage& message, const BagTopic& about, ImuTopic& topic) {
-  const std::optional<ImuSample> sample = imu_of(message.data, about.encoding);
+void take_imu(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, ImuTopic& topic) {
+  std::optional<ImuSample> sample = imu_of(message.data, about.encoding);
   if (!sample) {
     ++topic.malformed;
     return;
@@ -40,14 +40,15 @@ void take_imu(const BagMessage& message, const BagTopic& about, ImuTopic& topic)
     topic.frame = realsense_stream(about.name);
     if (topic.frame.empty()) topic.frame = in.frame();
   }
+  if (recorded) sample->t = *recorded;
   topic.samples.push_back(*sample);
 }
 
-void take_image(const BagMessage& message, const BagTopic& about, ImageTopic& topic) {
+void take_image(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, ImageTopic& topic) {
   topic.compressed = about.type == "sensor_msgs/CompressedImage";
   topic.encoding = about.encoding;
   const std::optional<Time> t = stamp_of(message.data, about.encoding);
-  if (t) topic.rows.push_back({*t, place_name(message.place)});
+  if (t) topic.rows.push_back({recorded.value_or(*t), place_name(message.place)});
   else ++topic.malformed;
 }
 
@@ -157,14 +158,16 @@ MessagePlace place_of(const std::string& name) {
   return place;
 }
 
-BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message) {
+BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message,
+                          bool by_recording) {
   BagContents out;
   while (const std::optional<BagMessage> message = bag.next()) {
     const BagTopic about = bag.topics()[message->topic];
     if (on_message) on_message(*message, about);
-    if (about.type == "sensor_msgs/Imu") take_imu(*message, about, out.imu[about.name]);
+    const std::optional<Time> recorded = by_recording ? std::optional(message->log_time) : std::nullopt;
+    if (about.type == "sensor_msgs/Imu") take_imu(*message, about, recorded, out.imu[about.name]);
     else if (about.type == "sensor_msgs/Image" || about.type == "sensor_msgs/CompressedImage")
-      take_image(*message, about, out.images[about.name]);
+      take_image(*message, about, recorded, out.images[about.name]);
     else if (about.type == "sensor_msgs/CameraInfo") take_camera(*message, about, out);
     else if (about.type == "geometry_msgs/Transform") take_stream_transform(*message, about, out);
     else if (about.type == "tf2_msgs/TFMessage" && about.name.ends_with("tf_static")) {

@@ -41,8 +41,10 @@ struct BagContents {
   std::string rig;                            ///< of a bag that `fbvins convert` wrote: all of its calibration (rig_text.hpp)
 };
 
-/// `on_message` is called with every message before it is read.
-BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message = {});
+/// `on_message` is called with every message before it is read. `by_recording`: images and readings have the time at which they
+/// were recorded instead of their own stamp.
+BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message = {},
+                          bool by_recording = false);
 
 /// A message's place as a FrameEntry names it, and back.
 std::string place_name(const MessagePlace& place);

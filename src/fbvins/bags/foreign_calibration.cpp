@@ -11,6 +11,7 @@
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -210,6 +211,7 @@ Result<StereoRig> parse_basalt(YamlReader yaml) {  // JSON is YAML
   rig.imu_noise.accel_noise_density_mps2_rthz = worst_axis(yaml, root, "accel_noise_std");
   rig.imu_noise.gyro_random_walk_radps2_rthz = worst_axis(yaml, root, "gyro_bias_std");
   rig.imu_noise.accel_random_walk_mps3_rthz = worst_axis(yaml, root, "accel_bias_std");
+  rig.imu_noise.axes = read_basalt_axes(yaml, root);
   rig.time_offset_s = 1e-9 * yaml.number_between(root, "cam_time_offset_ns", -1e10, 1e10, 0);
   return finished(yaml, rig);
 }

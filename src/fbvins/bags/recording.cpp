@@ -18,6 +18,7 @@
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/camera_order.hpp"
+#include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -123,9 +124,9 @@ class BagRecording {
       const Duration start = Duration::from_seconds(o.start_s), end = start + Duration::from_seconds(o.duration_s);
       bag->only(start - kImuLeadIn - kRecordingDelay, o.duration_s > 0 ? end + kRecordingDelay : kForever);
     }
-    contents_ = read_contents(*bag);
+    contents_ = read_contents(*bag, {}, options_.by_recording);
     for (auto step :
-         {&BagRecording::choose, &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
+         {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
       if (Result<void> done = (this->*step)(); !done)
         return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
     describe_bag(*bag);
@@ -145,6 +146,26 @@ class BagRecording {
     return {};
   }
 
+  /// Header stamps of zero, which a driver that does not stamp leaves: an error where all are, else they are left out.
+  Result<void> check_stamps() {
+    const auto check = [&](const std::string& topic, auto& rows, const char* what) -> Result<void> {
+      const auto zero = std::erase_if(rows, [](const auto& row) { return row.t == Time{}; });
+      if (zero == 0) return {};
+      if (rows.empty())
+        return Error{ErrorCode::malformed, fmt::format("all {} {} on {} have a header stamp of zero: the driver does not stamp; "
+                                                       "--recording-time takes the times of recording", zero, what, topic)};
+      out_.info.warnings.push_back(fmt::format("{} of {} {} on {} have a header stamp of zero and are left out; --recording-time takes "
+                                               "the times of recording", zero, zero + rows.size(), what, topic));
+      return {};
+    };
+    for (const std::string& topic : topics_.cameras)
+      if (Result<void> good = check(topic, contents_.images.at(topic).rows, "images"); !good) return good;
+    for (const std::string& topic : {topics_.imu, topics_.accel})
+      if (const auto imu = contents_.imu.find(topic); imu != contents_.imu.end())
+        if (Result<void> good = check(topic, imu->second.samples, "readings"); !good) return good;
+    return {};
+  }
+
   Result<void> calibrate() {
     if (const auto own = own_rig(contents_, topics_); !rig_ && own) {
       if (!*own) return own->error();
@@ -158,6 +179,11 @@ class BagRecording {
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
       if (std::string said = rectified_topics(contents_, topics_); !said.empty()) out_.info.warnings.push_back(std::move(said));
+    }
+    if (const std::string& imu = options_.dataset.kalibr_imu; !imu.empty() && options_.calibration.empty()) {
+      const Result<ImuNoise> given = load_imu(imu, rig_->imu_noise);
+      if (!given) return given.error();
+      rig_->imu_noise = *given;
     }
     if (std::cmp_greater(topics_.cameras.size(), rig_->camera_count()))
       return Error{ErrorCode::invalid_argument, fmt::format("images of {} cameras are to be used, and the calibration has {}",
@@ -308,8 +334,8 @@ void find_tum_vi(const fs::path& folder, RecordingOptions& options) {
 /// noise figures to go with it.
 Result<void> take_calibration(bool bag, RecordingOptions& options) {
   if (options.calibration.empty()) {
-    if (options.imu_calibration.empty()) return {};
-    return Error{ErrorCode::invalid_argument, "a calibration of the IMU is given without one of the cameras"};
+    options.dataset.kalibr_imu = options.imu_calibration;  // with the recording's own cameras
+    return {};
   }
   const Result<StereoRig> rig = load_calibration(options.calibration, options.imu_calibration);
   if (!rig) return rig.error();

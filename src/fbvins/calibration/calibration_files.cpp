@@ -11,6 +11,7 @@
 #include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/csv.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -65,6 +66,21 @@ const char* basalt_name(const std::string& model) {
   return model == "ds" ? "ds" : "eucm";
 }
 
+struct BasaltAxes {
+  std::vector<double> accel, gyro;  ///< calib_accel_bias and calib_gyro_bias
+};
+
+/// (1 + S) reading - b; of the accelerometer S is lower triangular, and the gyroscope feels no force.
+Result<BasaltAxes> basalt_axes(const ImuIntrinsics& axes) {
+  const Mat3 accel = axes.accel.inverse(), gyro = axes.gyro.inverse(), S = accel - Mat3::Identity(), G = gyro - Mat3::Identity();
+  const Vec3 ba = accel * axes.bias.accel_mps2, bg = gyro * axes.bias.gyro_radps;
+  constexpr double kNone = 1e-9;
+  if (Vec3(S(0, 1), S(0, 2), S(1, 2)).cwiseAbs().maxCoeff() > kNone || axes.gyro_by_force.cwiseAbs().maxCoeff() > kNone)
+    return Error{ErrorCode::unsupported, "Basalt has no model of an accelerometer turned against the IMU, nor of a gyroscope that feels forces"};
+  return BasaltAxes{{ba.x(), ba.y(), ba.z(), S(0, 0), S(1, 0), S(2, 0), S(1, 1), S(2, 1), S(2, 2)},
+                    {bg.x(), bg.y(), bg.z(), G(0, 0), G(1, 0), G(2, 0), G(0, 1), G(1, 1), G(2, 1), G(0, 2), G(1, 2), G(2, 2)}};
+}
+
 std::string three(double value) { return yaml_list({value, value, value}); }
 
 }  // namespace
@@ -87,6 +103,7 @@ RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImu
   }
   out.time_offset_s = imu.time_offset_s, out.line_delay_s = imu.line_delay_s;
   out.imu_noise = noise;
+  if (imu.axes_sigma.gyro != Mat3::Zero()) out.imu_noise.axes = {.gyro = imu.axes.gyro, .accel = imu.axes.accel};
   return out;
 }
 
@@ -136,7 +153,8 @@ std::string to_kalibr_imu(const ImuNoise& noise) {
                       "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
                       kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
                       kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
-                      kalibr_number(noise.rate_hz));
+                      kalibr_number(noise.rate_hz)) +
+         imu_axes_text(noise.axes, "", false);
 }
 
 std::string to_kalibr_rig(const RigCalibration& rig) {
@@ -162,13 +180,14 @@ Result<std::string> to_basalt(const RigCalibration& rig) {
     sizes += fmt::format("{}[{}, {}]", k > 0 ? ", " : "", rig.cameras[k].width(), rig.cameras[k].height());
   }
   const ImuNoise& n = rig.imu_noise;
-  const std::string zeros9 = yaml_list(std::vector<double>(9, 0.0)), zeros12 = yaml_list(std::vector<double>(12, 0.0));
+  const Result<BasaltAxes> axes = basalt_axes(n.axes);
+  if (!axes) return axes.error();
   return fmt::format(
       "{{\n  \"value0\": {{\n    \"T_imu_cam\": [{}\n    ],\n    \"intrinsics\": [{}\n    ],\n    \"resolution\": [{}],\n"
       "    \"calib_accel_bias\": {},\n    \"calib_gyro_bias\": {},\n    \"imu_update_rate\": {:.17g},\n"
       "    \"accel_noise_std\": {},\n    \"gyro_noise_std\": {},\n    \"accel_bias_std\": {},\n    \"gyro_bias_std\": {},\n"
       "    \"cam_time_offset_ns\": {},\n    \"vignette\": []\n  }}\n}}\n",
-      poses, lenses, sizes, zeros9, zeros12, n.rate_hz, three(n.accel_noise_density_mps2_rthz),
+      poses, lenses, sizes, yaml_list(axes->accel), yaml_list(axes->gyro), n.rate_hz, three(n.accel_noise_density_mps2_rthz),
       three(n.gyro_noise_density_radps_rthz), three(n.accel_random_walk_mps3_rthz), three(n.gyro_random_walk_radps2_rthz),
       std::llround(1e9 * rig.time_offset_s));
 }

@@ -21,6 +21,7 @@ struct RigCalibration {
 };
 
 RigCalibration rig_calibration(const CameraCalibration& cameras);
+/// Of an IMU whose axes were estimated these; else those of `noise`, by which the readings were corrected.
 RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImuResult& imu, const ImuNoise& noise);
 
 RigCalibration rig_calibration(const StereoRig& rig);

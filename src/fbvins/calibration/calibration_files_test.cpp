@@ -50,7 +50,7 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   EXPECT_EQ(read->line_delay_s, rig.line_delay_s);
   EXPECT_DOUBLE_EQ(read->times(1).time_offset_s, -0.0103);
   EXPECT_DOUBLE_EQ(read->times(1).line_delay_s, 4e-5);
-  const auto noise = parse_kalibr_imu({"fixed.yaml", text});
+  const auto noise = parse_imu({"fixed.yaml", text});
   ASSERT_TRUE(noise) << noise.error().message;
   EXPECT_EQ(noise->gyro_noise_density_radps_rthz, 1.5e-3);
   EXPECT_EQ(noise->accel_random_walk_mps3_rthz, 4.5e-3);
@@ -107,7 +107,7 @@ TEST(CalibrationFiles, TheSecondCameraIsAlsoFoundThroughTheFirst) {
 
 TEST(CalibrationFiles, NoiseOfTheImuIsReadBack) {
   const RigCalibration rig = rig_with(example_cameras()[0]);
-  const auto read = parse_kalibr_imu({"imu.yaml", to_kalibr_imu(rig.imu_noise)});
+  const auto read = parse_imu({"imu.yaml", to_kalibr_imu(rig.imu_noise)});
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->gyro_noise_density_radps_rthz, rig.imu_noise.gyro_noise_density_radps_rthz);
   EXPECT_EQ(read->rate_hz, rig.imu_noise.rate_hz);

@@ -78,8 +78,19 @@ std::vector<std::size_t> parts_of(const std::vector<OwnedPiece>& pieces, std::si
   return out;
 }
 
-FlightRig as_flown(FlightRig rig) {
-  rig.axes = {};
+/// What is flown: axes that were free in the fit, but are not refined, are as given.
+FlightRig as_flown(const FlightLesson& lesson) {
+  FlightRig rig = lesson.rig;
+  const std::vector<FlightParameter> parameters = flight_parameters(rig);
+  std::size_t at = 0;
+  while (parameters[at].group != FlightGroup::gyro_axes) ++at;
+  const auto take = [&](double& element, double given) {
+    if (lesson.findings[at++] != FlightFinding::refined) element = given;
+  };
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) take(rig.axes.gyro(i, j), i == j);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j <= i; ++j) take(rig.axes.accel(i, j), i == j);
   return rig;
 }
 
@@ -95,7 +106,7 @@ HeldOutPart judged(const Division& division, const FlightRig& given, const Fligh
   HeldOutPart out{division.name, lesson.changed};
   if (!lesson.changed) return out;
   out.given = settled_cost(division.held_out, given, lesson.noise);
-  out.refined = settled_cost(division.held_out, as_flown(lesson.rig), lesson.noise);
+  out.refined = settled_cost(division.held_out, as_flown(lesson), lesson.noise);
   out.gain = (out.given - out.refined) / lesson.noise.spread;
   return out;
 }
@@ -109,8 +120,7 @@ void fill_parameters(const FlightLesson& lesson, const FlightRig& given, FlightC
     const FlightParameter& p = parameters[i];
     const bool keeps = lesson.findings[i] != FlightFinding::refined;
     out.parameters.push_back({p.name, p.unit, before[k], keeps ? before[k] : after[k], keeps ? 0 : change[k],
-                              std::sqrt(std::max(0.0, lesson.covariance(k, k))), p.prior_sigma, lesson.findings[i],
-                              is_flown(p.group)});
+                              std::sqrt(std::max(0.0, lesson.covariance(k, k))), p.prior_sigma, lesson.findings[i]});
   }
 }
 
@@ -123,7 +133,7 @@ double total_gain(const FlightCalibration& found) {
 /// Why the calibration stays as given; empty where it does not.
 std::string objection_to(const FlightCalibration& found, bool changed, double least_gain) {
   const bool determined = std::any_of(found.parameters.begin(), found.parameters.end(), [](const RefinedParameter& p) {
-    return p.flown && p.finding != FlightFinding::not_determined;
+    return p.finding != FlightFinding::not_determined;
   });
   if (!determined) return "these flights determine no parameter: the calibration stays as given";
   if (!changed) return "what these flights determine is as given: the calibration stays";
@@ -215,9 +225,9 @@ FlightCalibration refined(const Division& all, const std::vector<Division>& divi
   out.verdict = objection_to(out, lesson.changed, question.rough ? 0 : kLeastGain);
   out.better = out.verdict.empty();
   if (!out.better)
-    for (RefinedParameter& p : out.parameters) p.value = p.flown ? p.given : p.value;
+    for (RefinedParameter& p : out.parameters) p.value = p.given;
   if (!out.better) return out;
-  out.rig = refined_rig(out.rig, lesson.rig);
+  out.rig = refined_rig(out.rig, as_flown(lesson));
   out.verdict = "what was held out is predicted better by the refined calibration than by the one given";
   return out;
 }

@@ -40,7 +40,6 @@ struct RefinedParameter {
   double sigma = 0;   ///< by `covariance`
   double prior_sigma = 0;
   FlightFinding finding = FlightFinding::not_determined;
-  bool flown = true;  ///< false: no file of a rig has it
 };
 
 /// A part of the flights as the given calibration predicts it, and as one does that was fitted to all other parts.

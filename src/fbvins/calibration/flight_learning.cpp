@@ -74,12 +74,12 @@ class Choice {
   std::vector<bool> free() const {
     std::vector<bool> out;
     for (std::size_t i = 0; i < parameters_.size(); ++i)
-      out.push_back(findings_[i] == FlightFinding::refined || !is_flown(parameters_[i].group));
+      out.push_back(findings_[i] == FlightFinding::refined || is_axis(parameters_[i].group));
     return out;
   }
   bool changed() const {
     for (std::size_t i = 0; i < parameters_.size(); ++i)
-      if (findings_[i] == FlightFinding::refined && is_flown(parameters_[i].group)) return true;
+      if (findings_[i] == FlightFinding::refined) return true;
     return false;
   }
 

@@ -21,7 +21,7 @@ struct FlightLesson {
   FlightNoise noise;
   std::vector<FlightFinding> findings;  ///< by parameter
   Eigen::MatrixXd covariance;           ///< of all parameters, with all of them unknown
-  bool changed = false;                 ///< something that is flown
+  bool changed = false;                 ///< something
 };
 
 FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given);
@@ -38,7 +38,7 @@ struct FlightQuestion {
 FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
                         const FlightQuestion& question);
 
-/// Whether a file of a rig has it.
-inline bool is_flown(FlightGroup group) { return group != FlightGroup::gyro_axes && group != FlightGroup::accel_axes; }
+/// Scale and axes of the IMU: free in every fit, so that their errors are not taken for another parameter's.
+inline bool is_axis(FlightGroup group) { return group == FlightGroup::gyro_axes || group == FlightGroup::accel_axes; }
 
 }  // namespace fbvins

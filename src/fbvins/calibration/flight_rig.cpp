@@ -71,6 +71,7 @@ StereoRig refined_rig(StereoRig rig, const FlightRig& found) {
     cameras.push_back({found.cameras[k], (found.T_BC0 * found.T_CnC0[k].inverse()).cast_frames<B, C0>()});
   rig = with_cameras(std::move(rig), cameras);
   rig.time_offset_s = found.time_offset_s;
+  rig.imu_noise.axes = followed_by(rig.imu_noise.axes, {.gyro = found.axes.gyro, .accel = found.axes.accel});
   return rig;
 }
 

@@ -22,7 +22,7 @@ struct FlightRig {
   Pose<B, C0> T_BC0;
   std::vector<Pose<Cn, C0>> T_CnC0;  ///< the first: identity
   double time_offset_s = 0;          ///< t_imu = t_image + time_offset_s
-  ImuTriads axes;                    ///< of the IMU; no file of a rig has them
+  ImuTriads axes;                    ///< of the IMU, beyond those of the calibration given
 };
 
 /// What is kept or changed together.
@@ -47,7 +47,7 @@ struct FlightParameter {
 };
 
 FlightRig flight_rig(const StereoRig& rig);
-/// `rig` with the calibration found, but for the IMU's axes, which it does not have.
+/// `rig` with the calibration found; its IMU's axes are those of `rig` followed by those found.
 StereoRig refined_rig(StereoRig rig, const FlightRig& found);
 
 std::vector<FlightParameter> flight_parameters(const FlightRig& rig);

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -77,6 +79,39 @@ Result<void> check_camera(const Camera& camera, std::string_view side, std::stri
   return {};
 }
 
+/// A scale that is farther from 1 than this, or its reciprocal, is another unit or no calibration; a cheap IMU has 3 %, and axes
+/// that stand 8 degrees from square change a scale by 15 %.
+constexpr double kSmallestScale = 0.75;
+/// Half a radian a second at rest: no gyroscope that is sold does that by gravity, or has such a bias.
+constexpr double kLargestByForce = 0.05, kLargestGyroBias_radps = 1, kLargestAccelBias_mps2 = 5;
+
+/// By how much the matrix stretches at least and at most.
+std::pair<double, double> stretch(const Mat3& m) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> squares(m.transpose() * m, Eigen::EigenvaluesOnly);
+  return {std::sqrt(std::max(0.0, squares.eigenvalues()(0))), std::sqrt(squares.eigenvalues()(2))};
+}
+
+Result<void> check_axes(const ImuIntrinsics& axes, std::string_view origin) {
+  for (const auto& [matrix, name] : {std::pair(&axes.gyro, "gyroscope"), {&axes.accel, "accelerometer"}}) {
+    if (!matrix->allFinite()) return malformed(origin, fmt::format("the {}'s scale and axes have a number that is not finite", name));
+    const auto [least, most] = stretch(*matrix);
+    if (!(least >= kSmallestScale) || !(most <= 1 / kSmallestScale))
+      return malformed(origin, fmt::format("the {}'s scale is {:.2f} to {:.2f}, not {} to {:.2f}: no IMU reads so; is the unit another "
+                                           "one, or was the calibration not determined?",
+                                           name, least, most, kSmallestScale, 1 / kSmallestScale));
+    if (!(matrix->determinant() > 0)) return malformed(origin, fmt::format("the {}'s axes are left-handed", name));
+  }
+  if (!(axes.gyro_by_force.cwiseAbs().maxCoeff() <= kLargestByForce))
+    return malformed(origin, fmt::format("the gyroscope's sensitivity to forces is more than {} rad/s for each m/s^2", kLargestByForce));
+  if (!(axes.bias.gyro_radps.cwiseAbs().maxCoeff() <= kLargestGyroBias_radps) ||
+      !(axes.bias.accel_mps2.cwiseAbs().maxCoeff() <= kLargestAccelBias_mps2))
+    return malformed(origin, fmt::format("the IMU's bias is more than {} rad/s or {} m/s^2", kLargestGyroBias_radps,
+                                         kLargestAccelBias_mps2));
+  return {};
+}
+
+}  // namespace
+
 Result<void> check_imu(const ImuNoise& noise, std::string_view origin) {
   for (const auto& [figure, name] : {std::pair(noise.gyro_noise_density_radps_rthz, "gyroscope's noise density"),
                                      {noise.accel_noise_density_mps2_rthz, "accelerometer's noise density"},
@@ -84,8 +119,10 @@ Result<void> check_imu(const ImuNoise& noise, std::string_view origin) {
                                      {noise.accel_random_walk_mps3_rthz, "accelerometer's random walk"},
                                      {noise.rate_hz, "IMU's rate"}})
     if (!positive(figure)) return malformed(origin, fmt::format("the {} is {}, not positive", name, figure));
-  return {};
+  return check_axes(noise.axes, origin);
 }
+
+namespace {
 
 Result<void> check_depth(const StereoRig& rig, std::string_view origin) {
   const DepthSensor& sensor = *rig.depth;

@@ -64,7 +64,7 @@ struct Evidence {
   StereoOrder order;      ///< of the first seconds' images
   bool swapped = false;   ///< left and right images were exchanged, and all that follows has them in order
   StereoStep step;        ///< right images that were late or early are in order as well
-  std::vector<ImuSample> imu;
+  std::vector<ImuSample> imu;  ///< corrected by the calibration's axes
   std::vector<Time> stamps;  ///< of all stereo images
   bool untriggered = false;  ///< right images were taken at other times than left ones, as their stamps say
   std::vector<SeenFrame> frames;

@@ -277,7 +277,7 @@ EvidenceGatherer::~EvidenceGatherer() = default;
 bool EvidenceGatherer::push(const SensorEvent& event) {
   State& s = *state_;
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
-    s.evidence.imu.push_back(*sample);
+    s.evidence.imu.push_back(corrected(*sample, s.evidence.rig.imu_noise.axes));
     return true;
   }
   if (s.enough()) return false;

@@ -66,5 +66,26 @@ TEST(Evaluation, FiguresOfAKnownShift) {
   EXPECT_NEAR(e->largest_excursion_m, excursion_m, 1e-12);
 }
 
+TEST(Evaluation, ATruthWithAGapIsSaid) {
+  const Trajectory<AnyWorld> estimate = flight(400);
+  Trajectory<AnyWorld> truth;
+  const double step_s = (estimate[1].t - estimate[0].t).seconds();
+  for (std::size_t i = 0; i < 400; ++i)
+    if (i < 100 || i >= 300) {
+      truth.push_back(estimate[i]);
+      if (i >= 300) truth.back().T.p += Vec3(0, 0.3, 0);  // so far the estimate has drifted
+    }
+  const auto e = evaluate(truth, estimate, {});
+  ASSERT_TRUE(e);
+  EXPECT_NEAR(e->longest_truth_gap_s, 201 * step_s, 1e-6);
+  EXPECT_NEAR(e->truth_share, 1 - 201.0 / 399, 1e-6);
+  ASSERT_TRUE(e->end_drift_m.has_value());
+  EXPECT_NEAR(*e->end_drift_m, 0.3, 1e-6);
+  EXPECT_NEAR(e->per_second_m.max, 0, 1e-9) << "not across the gap";
+  const auto whole = evaluate(estimate, estimate, {});
+  EXPECT_EQ(whole->truth_share, 1);
+  EXPECT_FALSE(whole->end_drift_m.has_value());
+}
+
 }  // namespace evaluation_test
 }  // namespace fbvins

@@ -19,7 +19,7 @@ ImuSample interpolated(const ImuSample& a, const ImuSample& b, Time t) {
 }  // namespace
 
 ImuHistory::ImuHistory(const ImuNoise& imu, Duration time_offset, const ImuHistoryOptions& options)
-    : time_offset_(time_offset), options_(options), judge_(imu) {
+    : time_offset_(time_offset), options_(options), judge_(imu), axes_(imu.axes) {
   readings_.reserve(512);
 }
 
@@ -30,7 +30,7 @@ bool ImuHistory::add(const ImuSample& reading) {
     readings_.erase(readings_.begin(), readings_.begin() + surplus);
     overflow_ += surplus;
   }
-  readings_.push_back(reading);
+  readings_.push_back(corrected(reading, axes_));
   readings_.back().t = reading.t - time_offset_;
   return true;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings of an IMU: judged where they come in, kept once, on the images' clock. Cuts them into segments between two times,
-// interpolates, and says what is missing.
+// The readings of an IMU: judged as they come, corrected by the calibration of its axes (ImuNoise::axes), kept once, on the images'
+// clock. Cuts them into segments between two times, interpolates, and says what is missing.
 //
 //   ImuHistory history(rig.imu_noise, Duration::from_seconds(rig.time_offset_s));
 //   history.add(sample);                                        // from the driver or the dataset, on the IMU's clock
@@ -47,6 +47,8 @@ class ImuHistory {
   /// Drops the readings that no segment from `t` on needs.
   void forget_before(Time t);
 
+  /// The last reading that was taken, corrected; there is one.
+  const ImuSample& newest() const { return readings_.back(); }
   int size() const { return static_cast<int>(readings_.size()); }
   ImuCounts counts() const;
 
@@ -57,6 +59,7 @@ class ImuHistory {
   Duration time_offset_;
   ImuHistoryOptions options_;
   ReadingJudge judge_;
+  ImuIntrinsics axes_;
   std::vector<ImuSample> readings_;  ///< on the images' clock, strictly increasing
   int overflow_ = 0;
 };

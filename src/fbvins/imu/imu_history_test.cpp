@@ -105,5 +105,14 @@ TEST(ImuHistory, ForgetsWhatNoLaterSegmentNeeds) {
   EXPECT_FALSE(history.add(ramp(895))) << "stamps stay forward";
 }
 
+TEST(ImuHistory, CorrectsTheAxesOnceAndJudgesWhatTheSensorRead) {
+  ImuNoise imu{.max_accel_mps2 = 20};
+  imu.axes.accel(2, 2) = 1.25;
+  ImuHistory history(imu);
+  EXPECT_TRUE(history.add({ms(0), Vec3(0.1, 0, 0), Vec3(0, 0, 19)}));
+  EXPECT_DOUBLE_EQ(history.newest().accel_mps2.z(), 15.2);
+  EXPECT_FALSE(history.add({ms(5), Vec3(0.1, 0, 0), Vec3(0, 0, 21)})) << "beyond the range of the reading, if not of what it means";
+}
+
 }  // namespace imu_history_test
 }  // namespace fbvins

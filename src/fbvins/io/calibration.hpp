@@ -42,7 +42,8 @@ Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const Imu
 
 /// Kalibr's camchain-imucam.yaml; imu_noise stays at its defaults.
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read = {});
-/// Kalibr's imu.yaml, with or without the level of the IMU's name.
-Result<ImuNoise> parse_kalibr_imu(YamlReader yaml, const std::string& name = "imu0");
+/// Kalibr's or OpenVINS' imu.yaml, with or without the level of the IMU's name. RealSense's JSON of an IMU has axes alone: the
+/// rest is `otherwise`.
+Result<ImuNoise> parse_imu(YamlReader yaml, const ImuNoise& otherwise = {}, const std::string& name = "imu0");
 
 }  // namespace fbvins

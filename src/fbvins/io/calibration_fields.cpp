@@ -9,6 +9,7 @@
 
 #include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -183,6 +184,7 @@ ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::stri
   noise.rate_hz = yaml.positive(map, rate_field);
   if (yaml.has(map, "gyroscope_range")) noise.max_gyro_radps = yaml.positive(map, "gyroscope_range");
   if (yaml.has(map, "accelerometer_range")) noise.max_accel_mps2 = yaml.positive(map, "accelerometer_range");
+  noise.axes = read_imu_axes(yaml, map);
   return noise;
 }
 

@@ -51,9 +51,9 @@ DepthSensor read_depth_sensor(YamlReader& yaml, const YAML::Node& map);
 /// The same as text, each line after `indent`.
 std::string depth_sensor_text(const DepthSensor& sensor, const std::string& indent);
 
-/// The four noise figures; rate_field is "rate_hz" or "update_rate".
+/// The four noise figures, ranges and axes (imu_axes_fields.hpp); rate_field is "rate_hz" or "update_rate".
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field);
-/// The same as text, without the rate, each line after `indent`; `number`: how fmt writes one.
+/// The noise figures as text, without the rate, each line after `indent`; `number`: how fmt writes one.
 std::string imu_noise_text(const ImuNoise& noise, const std::string& indent, fmt::string_view number);
 
 }  // namespace fbvins

@@ -190,13 +190,13 @@ TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
   for (std::size_t start = 0; start < flat.size(); start = flat.find('\n', start) + 1)
     nested += "  " + flat.substr(start, flat.find('\n', start) + 1 - start);
   for (const std::string& text : {flat, nested}) {
-    const auto noise = parse_kalibr_imu({"imu.yaml", text});
+    const auto noise = parse_imu({"imu.yaml", text});
     ASSERT_TRUE(noise) << noise.error().message;
     EXPECT_EQ(noise->accel_noise_density_mps2_rthz, 0.01);
     EXPECT_EQ(noise->gyro_random_walk_radps2_rthz, 4.0e-06);
     EXPECT_EQ(noise->rate_hz, 200);
   }
-  EXPECT_EQ(parse_kalibr_imu({"imu.yaml", "imu0: {}\n"}).error().message, "imu.yaml:1: gyroscope_noise_density: is missing");
+  EXPECT_EQ(parse_imu({"imu.yaml", "imu0: {}\n"}).error().message, "imu.yaml:1: gyroscope_noise_density: is missing");
 }
 
 TEST(Calibration, KalibrsImuMayLieInTheFileOfTheCameras) {

@@ -57,6 +57,10 @@ RowVerdict parse_doubles(const std::vector<std::string_view>& fields, std::size_
 /// far future costs one row and not all that follow. The first of equal stamps is kept.
 std::vector<bool> longest_increasing(const std::vector<Time>& stamps);
 
+/// Continues stamps of a counter of 32 bits of microseconds that began again at 0: from each step back by 4294.967296 s, less at
+/// most 10 s, on. Returns how often that was. All other steps back stay as they are.
+int continue_wrapped(std::vector<Time>& stamps);
+
 /// An error if there are no rows or fewer than half of them are good.
 Result<void> judge(const RowCounts& counts, const std::string& file);
 
@@ -90,6 +94,8 @@ Result<StampedRows<Row>> read_stamped_lines(const std::vector<CsvLine>& data, co
     ++(verdict == RowVerdict::malformed ? counts.malformed : counts.not_finite);
     blame(line.number, problem);
   }
+  counts.wraps = continue_wrapped(stamps);
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].t = stamps[i];
   const std::vector<bool> keep = longest_increasing(stamps);
   Time previous{-1};
   for (std::size_t i = 0; i < rows.size(); ++i) {

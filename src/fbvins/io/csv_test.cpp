@@ -105,5 +105,18 @@ TEST(StampedRows, FirstBadIsTheFirstLineOfAnyKind) {
   EXPECT_EQ(rows->counts.bad(), 2);
 }
 
+TEST(Csv, AWrappedCounterIsContinued) {
+  const std::int64_t wrap = 4294967296000, ms = 1'000'000;
+  std::vector<Time> stamps = {Time{wrap - 100 * ms}, Time{wrap - 50 * ms}, Time{0}, Time{50 * ms}};
+  EXPECT_EQ(continue_wrapped(stamps), 1);
+  EXPECT_EQ(stamps[2], Time{wrap});
+  EXPECT_EQ(stamps[3], Time{wrap + 50 * ms});
+  std::vector<Time> set_back = {Time{wrap}, Time{wrap + 50 * ms}, Time{wrap - 1000 * ms}, Time{wrap - 950 * ms}}, before = set_back;
+  EXPECT_EQ(continue_wrapped(set_back), 0) << "a clock that is set back is no counter that wraps";
+  EXPECT_EQ(set_back, before);
+  std::vector<Time> damaged = {Time{wrap}, Time{wrap + 50 * ms}, Time{70 * ms}, Time{wrap + 150 * ms}};
+  EXPECT_EQ(continue_wrapped(damaged), 0) << "one row alone";
+}
+
 }  // namespace csv_test
 }  // namespace fbvins

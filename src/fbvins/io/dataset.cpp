@@ -134,8 +134,6 @@ Error no_depth_images(const std::string& path) {
 
 Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const DatasetOptions& options) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
-  if (!options.kalibr_imu.empty() && options.kalibr_camchain.empty())
-    return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
   Result<DatasetContents> contents = contents_of(path, options);
   if (!contents) return contents.error();
   if (const auto scaled = options.scale_lenses ? scaled_to_images(*contents) : std::nullopt) {

@@ -120,6 +120,11 @@ class EurocReader {
       warn(fmt::format("{}: no such file; IMU noise figures are the defaults", named("imu0/sensor.yaml")));
     }
     T_BI_ = imu.T_BS;
+    if (options_.kalibr_camchain.empty() && !options_.kalibr_imu.empty()) {
+      const Result<ImuNoise> given = load_imu(options_.kalibr_imu, imu.noise);
+      if (!given) return given.error();
+      imu.noise = *given;
+    }
     return options_.kalibr_camchain.empty() ? read_own_calibration(imu) : read_kalibr_calibration(imu);
   }
 
@@ -307,6 +312,8 @@ class EurocReader {
   }
 
   void warn_about_rows(const RowCounts& c, const std::string& file) {
+    if (c.wraps > 0)
+      warn(fmt::format("{}: a counter of 32 bits of microseconds began again at 0 ({} x): the stamps are continued", file, c.wraps));
     if (c.bad() > 0)
       warn(fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}",
                        file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));

@@ -13,6 +13,7 @@
 
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 #include "fbvins/io/imu_file.hpp"
 #include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
@@ -67,7 +68,7 @@ std::string imu_yaml(const ImuNoise& n, const std::string& origin) {
   if (n.max_gyro_radps != usual.max_gyro_radps || n.max_accel_mps2 != usual.max_accel_mps2)
     range = fmt::format("gyroscope_range: {}\naccelerometer_range: {}\n", n.max_gyro_radps, n.max_accel_mps2);
   return fmt::format("sensor_type: imu\ncomment: {}\n\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero()) +
-         fmt::format("rate_hz: {}\n\n", n.rate_hz) + imu_noise_text(n, "", "{}") + range;
+         fmt::format("rate_hz: {}\n\n", n.rate_hz) + imu_noise_text(n, "", "{}") + range + imu_axes_text(n.axes, "", true);
 }
 
 std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {

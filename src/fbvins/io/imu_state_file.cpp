@@ -9,6 +9,7 @@
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -52,7 +53,7 @@ bool same(const ImuNoise& a, const ImuNoise& b) {
   return a.gyro_noise_density_radps_rthz == b.gyro_noise_density_radps_rthz &&
          a.accel_noise_density_mps2_rthz == b.accel_noise_density_mps2_rthz &&
          a.gyro_random_walk_radps2_rthz == b.gyro_random_walk_radps2_rthz &&
-         a.accel_random_walk_mps3_rthz == b.accel_random_walk_mps3_rthz && a.rate_hz == b.rate_hz;
+         a.accel_random_walk_mps3_rthz == b.accel_random_walk_mps3_rthz && a.rate_hz == b.rate_hz && a.axes == b.axes;
 }
 
 }  // namespace
@@ -97,7 +98,7 @@ std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
              "# Biases of an IMU at the end of a flight (fbvins --imu-state), for the next one; covariances as upper triangles.\n"
              "imu_state: 1\nt_ns: {}\nimu:\n  rate_hz: {:.17g}\n",
              state.t.ns, n.rate_hz) +
-         imu_noise_text(n, "  ", "{:.17g}") +
+         imu_noise_text(n, "  ", "{:.17g}") + imu_axes_text(n.axes, "  ", true) +
          fmt::format("gyro_bias_radps: {}\naccel_bias_mps2: {}\ngyro_bias_covariance: {}\naccel_bias_covariance: {}\n",
                      list(b.bias.gyro_radps.data(), 3), list(b.bias.accel_mps2.data(), 3), upper(b.gyro_covariance),
                      upper(b.accel_covariance));

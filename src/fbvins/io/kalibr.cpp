@@ -10,6 +10,7 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/foreign_files.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -43,7 +44,12 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
   return rig;
 }
 
-Result<ImuNoise> parse_kalibr_imu(YamlReader yaml, const std::string& name) {
+Result<ImuNoise> parse_imu(YamlReader yaml, const ImuNoise& otherwise, const std::string& name) {
+  if (is_realsense_imu(yaml)) {
+    ImuNoise noise = otherwise;
+    noise.axes = read_realsense_imu(yaml);
+    return yaml.ok() ? Result<ImuNoise>(noise) : yaml.error();
+  }
   const YAML::Node nested = yaml.get(yaml.root(), name);
   const ImuNoise noise = read_imu_noise(yaml, nested.IsDefined() ? nested : yaml.root(), "update_rate");
   if (!yaml.ok()) return yaml.error();
@@ -62,6 +68,12 @@ Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optio
   const YamlReader same_file(camchain_path, *camchain);
   if (!imu_path && !same_file.has(same_file.root(), "imu0")) return rig;
   return imu_path ? with_imu_file(*rig, *imu_path) : with_imu_text(*rig, camchain_path, *camchain, "");
+}
+
+Result<ImuNoise> load_imu(const std::string& path, const ImuNoise& otherwise) {
+  const Result<std::string> text = read_file(path, kLargestYaml_bytes);
+  if (!text) return text.error();
+  return parse_imu({path, *text}, otherwise);
 }
 
 }  // namespace fbvins

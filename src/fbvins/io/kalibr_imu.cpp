@@ -103,7 +103,7 @@ Result<StereoRig> with_imu_text(const StereoRig& rig, const std::string& file, c
   }
   const std::optional<ImuPlace> imu = chosen(yaml, which);
   if (!imu) return yaml.error();
-  const Result<ImuNoise> noise = parse_kalibr_imu({file, text}, imu->name.empty() ? "imu0" : imu->name);
+  const Result<ImuNoise> noise = parse_imu({file, text}, rig.imu_noise, imu->name.empty() ? "imu0" : imu->name);
   if (!noise) return noise.error();
   StereoRig out = same(*imu, {}) ? rig : seen_from(rig, *imu);
   out.imu_noise = *noise;

@@ -224,18 +224,22 @@ class RecordReader {
     if (!rig) return Error{ErrorCode::malformed, fmt::format("{}: holds no calibration, and none is given with it", name_)};
     if (!*rig) return rig->error();
     out_.rig = **rig;
+    if (options_.kalibr_imu.empty()) return {};
+    const Result<ImuNoise> given = load_imu(options_.kalibr_imu, out_.rig.imu_noise);
+    if (!given) return given.error();
+    out_.rig.imu_noise = *given;
     return {};
   }
 
   /// Without Kalibr's file of the IMU, its noise is that of the record.
   Result<void> read_kalibr_calibration() {
     const auto& imu = options_.kalibr_imu;
-    Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
+    const std::optional<Result<StereoRig>> own = attached_calibration();
+    Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu),
+                                        own && *own ? (*own)->imu_noise : ImuNoise{});
     if (!rig) return rig.error();
     out_.rig = *rig;
-    if (!imu.empty()) return {};
-    const std::optional<Result<StereoRig>> own = attached_calibration();
-    if (own && *own) return out_.rig.imu_noise = (*own)->imu_noise, Result<void>{};
+    if (!imu.empty() || (own && *own)) return {};
     const std::string why = own ? own->error().message : fmt::format("{}: holds no calibration", name_);
     out_.info.warnings.push_back(fmt::format("{}; IMU noise figures are the defaults", why));
     return {};

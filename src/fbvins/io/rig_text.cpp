@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
 namespace {
@@ -79,9 +80,9 @@ std::string rig_to_yaml(const StereoRig& rig) {
          camera_text("left", rig.left) + (rig.has_right() ? camera_text("right", rig.right) : "") +
          pose_text("T_BC0", rig.T_BC0) + (rig.has_right() ? pose_text("T_BC1", rig.T_BC1) : "") + further_cameras_text(rig) +
          fmt::format("imu:\n  rate_hz: {:.17g}\n", n.rate_hz) + imu_noise_text(n, "  ", "{:.17g}") +
-         fmt::format(
-             "  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\nimage_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
-             n.max_gyro_radps, n.max_accel_mps2, rig.image_rate_hz, rig.time_offset_s) +
+         fmt::format("  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\n", n.max_gyro_radps, n.max_accel_mps2) +
+         imu_axes_text(n.axes, "  ", true) +
+         fmt::format("image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n", rig.image_rate_hz, rig.time_offset_s) +
          (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s)) +
          (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "") +
          (rig.depth && rig.depth->own

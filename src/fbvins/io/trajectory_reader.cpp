@@ -8,14 +8,15 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/numbers.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/io/trajectory_format.hpp"
 
 namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargestTrajectory_bytes = std::uint64_t{1} << 30u;
 constexpr double kLargestValue = 1e9;
-// Columns of EuRoC's ground truth: stamp, position, quaternion, velocity, two biases; and of ours.
-constexpr std::size_t kPoseColumns = 8, kStateColumns = 17, kOdometryColumns = 41, kHealthColumn = 38;
+// Columns of a stamp, a position and a quaternion; and of our odometry.
+constexpr std::size_t kPoseColumns = 8, kOdometryColumns = 41, kHealthColumn = 38;
 
 /// q is w x y z. Files round; what is further from length 1 than that is no rotation.
 RowVerdict set_pose(const double* p, double w, double x, double y, double z, TrajectoryPoint& point, std::string& problem) {
@@ -28,38 +29,27 @@ RowVerdict set_pose(const double* p, double w, double x, double y, double z, Tra
   return RowVerdict::good;
 }
 
-RowVerdict parse_tum_row(const std::vector<std::string_view>& fields, TrajectoryPoint& point, std::string& problem) {
-  if (fields.size() != kPoseColumns) {
-    problem = fmt::format("{} columns where {} are needed", fields.size(), kPoseColumns);
+RowVerdict parse_row(const TrajectoryLayout& layout, const std::vector<std::string_view>& fields, TrajectoryPoint& point,
+                     std::string& problem) {
+  if (fields.size() != layout.columns || fields.size() < layout.stamp + kPoseColumns) {
+    problem = fmt::format("{} columns where {} are needed", fields.size(), std::max(layout.columns, layout.stamp + kPoseColumns));
     return RowVerdict::malformed;
   }
-  const auto t = parse_seconds(fields[0]);
-  problem = t ? "a value is not a usable number" : fmt::format("'{}' is not a stamp in seconds", fields[0].substr(0, 40));
-  if (!t) return RowVerdict::malformed;
-  point.t = *t;
-  double v[7];
-  if (const RowVerdict verdict = parse_doubles(fields, 1, 7, kLargestValue, v); verdict != RowVerdict::good) return verdict;
-  return set_pose(v, v[6], v[3], v[4], v[5], point, problem);
-}
-
-RowVerdict parse_euroc_row(const std::vector<std::string_view>& fields, TrajectoryPoint& point, std::string& problem) {
-  if (fields.size() != kPoseColumns && fields.size() < kStateColumns) {
-    problem = fmt::format("{} columns where {} or at least {} are needed", fields.size(), kPoseColumns, kStateColumns);
-    return RowVerdict::malformed;
-  }
-  const auto t = parse_nanoseconds(fields[0]);
-  problem = t ? "a value is not a usable number" : fmt::format("'{}' is not a stamp in nanoseconds", fields[0].substr(0, 40));
-  if (!t) return RowVerdict::malformed;
+  const std::string_view stamp = fields[layout.stamp];
+  const auto t = parse_stamp(layout, stamp);
+  const auto number = t ? std::nullopt : parse_double(stamp);
+  problem = t ? "a value is not a usable number"
+              : fmt::format("'{}' is not a stamp in {}", stamp.substr(0, 40),
+                            layout.unit_ns == 1 ? "nanoseconds" : layout.unit_ns == 1e9 ? "seconds" : "its unit");
+  if (!t) return number && std::isnan(*number) ? RowVerdict::not_finite : RowVerdict::malformed;
   point.t = *t;
   double v[16];
-  const bool state = fields.size() >= kStateColumns;
-  const RowVerdict verdict = parse_doubles(fields, 1, state ? 16 : 7, kLargestValue, v);
+  const std::size_t count = layout.state ? 16 : layout.velocity ? 10 : 7;
+  const RowVerdict verdict = parse_doubles(fields, layout.stamp + 1, count, kLargestValue, v);
   if (verdict != RowVerdict::good) return verdict;
-  if (state) {
-    point.v_WB = Vec3(v[7], v[8], v[9]);
-    point.bias = ImuBias{Vec3(v[10], v[11], v[12]), Vec3(v[13], v[14], v[15])};
-  }
-  return set_pose(v, v[3], v[4], v[5], v[6], point, problem);
+  if (layout.state || layout.velocity) point.v_WB = Vec3(v[7], v[8], v[9]);
+  if (layout.state) point.bias = ImuBias{Vec3(v[10], v[11], v[12]), Vec3(v[13], v[14], v[15])};
+  return layout.w_first ? set_pose(v, v[3], v[4], v[5], v[6], point, problem) : set_pose(v, v[6], v[3], v[4], v[5], point, problem);
 }
 
 bool says_no_pose(const std::vector<std::string_view>& fields) {
@@ -67,44 +57,63 @@ bool says_no_pose(const std::vector<std::string_view>& fields) {
          (fields[kHealthColumn] == to_string(HealthState::initialising) || fields[kHealthColumn] == to_string(HealthState::lost));
 }
 
-bool has_commas(std::string_view text) {
-  const std::vector<CsvLine> lines = data_lines(text.substr(0, 1u << 16u));
-  return !lines.empty() && lines.front().text.find(',') != std::string_view::npos;
-}
-
 struct Row {
   Time t;
   TrajectoryPoint point;
-  bool no_pose = false;
+  bool no_pose = false, hidden = false;
 };
 
 }  // namespace
 
-Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file) {
-  const bool commas = has_commas(text);
+Result<TrajectoryFormat> parse_trajectory_format(const std::string& text) {
+  TrajectoryFormat out;
+  if (text.empty()) return out;
+  std::vector<std::string_view> words;
+  split_at_commas(text, words);
+  for (const std::string_view word : words) {
+    if (word == "ns" || word == "us" || word == "ms" || word == "s")
+      out.unit_ns = word == "ns" ? 1 : word == "us" ? 1e3 : word == "ms" ? 1e6 : 1e9;
+    else if (word == "wxyz" || word == "xyzw") out.w_first = word == "wxyz";
+    else return Error{ErrorCode::invalid_argument, fmt::format("'{}' is neither ns, us, ms, s, wxyz nor xyzw", word)};
+  }
+  return out;
+}
+
+Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file, const TrajectoryFormat& format) {
+  const std::vector<CsvLine> lines = lines_of(text), data = data_lines(text);
+  const auto layout = recognise(data, lines.empty() ? "" : lines.front().text, file, format);
+  if (!layout) return layout.error();
   std::vector<std::string_view> fields;
+  int nan_rows = 0;
   auto rows = read_stamped_rows<Row>(text, file, [&](std::string_view line, Row& row, std::string& problem) {
-    commas ? split_at_commas(line, fields) : split_at_blanks(line, fields);
-    const RowVerdict verdict = commas ? parse_euroc_row(fields, row.point, problem) : parse_tum_row(fields, row.point, problem);
+    split_row(*layout, line, fields);
+    const RowVerdict verdict = parse_row(*layout, fields, row.point, problem);
     row.t = row.point.t;
     row.no_pose = says_no_pose(fields);
-    return row.no_pose && verdict == RowVerdict::not_finite ? RowVerdict::good : verdict;
+    // Truth that is NaN where a marker was hidden: however many rows, the others are good.
+    row.hidden = !row.no_pose && verdict == RowVerdict::not_finite && row.t != Time{};
+    return row.no_pose && verdict == RowVerdict::not_finite ? RowVerdict::good : row.hidden ? RowVerdict::good : verdict;
   });
   if (!rows) return rows.error();
   TrajectoryFile out;
   out.counts = rows->counts;
+  out.recognised = layout->recognised;
   for (Row& row : rows->rows) {
+    row.point.t = row.t;
     if (row.no_pose) ++out.without_pose;
+    else if (row.hidden) ++nan_rows;
     else out.points.push_back(std::move(row.point));
   }
+  out.counts.not_finite += nan_rows;
+  if (nan_rows > 0 && out.counts.first_bad.empty()) out.counts.first_bad = fmt::format("{}: a value is not a usable number", file);
   if (out.points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: no row has a pose", file)};
   return out;
 }
 
-Result<TrajectoryFile> read_trajectory(const std::string& path) {
+Result<TrajectoryFile> read_trajectory(const std::string& path, const TrajectoryFormat& format) {
   Result<std::string> text = read_file(path, kLargestTrajectory_bytes);
   if (!text) return text.error();
-  return parse_trajectory(*text, path);
+  return parse_trajectory(*text, path, format);
 }
 
 }  // namespace fbvins

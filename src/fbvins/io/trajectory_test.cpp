@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/trajectory.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -149,6 +151,69 @@ TEST(Trajectory, ErrorsNameTheLine) {
   EXPECT_EQ(message("1.5,0,0,0,1,0,0,0\n"), "t:1: '1.5' is not a stamp in nanoseconds (1 of 1 rows are unusable)");
   EXPECT_EQ(message("1,0,0,0,1,0,0,0,5\n"), "t:1: 9 columns where 8 or at least 17 are needed (1 of 1 rows are unusable)");
   EXPECT_EQ(read_trajectory("/nowhere").error().message, "/nowhere: no such file");
+}
+
+/// Of each file's three rows the last: 1403636584.863555584 s at (1, 2, 3), a quarter turn about z.
+void expect_last(const std::string& text, const std::string& recognised, const TrajectoryFormat& format = {}) {
+  const auto file = parse_trajectory(text, "t", format);
+  ASSERT_TRUE(file) << file.error().message;
+  ASSERT_EQ(file->points.size(), 3u);
+  const TrajectoryPoint& last = file->points.back();
+  EXPECT_LT(std::abs(last.t.ns - 1403636584863555584), 1000) << text;
+  EXPECT_LT((last.T_WB.p - Vec3(1, 2, 3)).norm(), 1e-12);
+  EXPECT_NEAR(last.T_WB.q.z(), 0.5 * std::sqrt(2), 1e-6) << text;
+  EXPECT_EQ(file->recognised, recognised);
+}
+
+/// Three rows whose stamps are 50 ms apart, of `behind` the stamp, each ended by `end`.
+std::string three(const std::vector<std::string>& stamps, const std::string& behind, const std::string& end = "\n") {
+  std::string out;
+  for (const std::string& stamp : stamps) out += stamp + behind + end;
+  return out;
+}
+
+const std::vector<std::string> kNs = {"1403636584763555584", "1403636584813555456", "1403636584863555584"};
+const std::vector<std::string> kSeconds = {"1403636584.763555584", "1403636584.813555456", "1403636584.863555584"};
+const std::string kWFirst = ",1,2,3,0.70710678,0,0,0.70710678", kWLast = " 1 2 3 0 0 0.70710678 0.70710678";
+
+TEST(Trajectory, AsOtherSystemsWriteIt) {
+  expect_last(three(kNs, kWFirst, ",\n"), "");                                                          // VINS-Fusion
+  expect_last(three(kNs, kWFirst + ",0.1,0.2,0.3", ",\n"), "the velocity behind the pose");              // VINS-Mono
+  expect_last(three({"1403636584763555584.000000", "1403636584813555456.000000", "1403636584863555584.000000"}, kWLast),
+              "stamps in nanoseconds");                                                                  // ORB-SLAM3
+  expect_last(three({"1403636584763555", "1403636584813555", "1403636584863555"}, kWLast), "stamps in microseconds");
+  expect_last(three({"1403636584763.555584", "1403636584813.555456", "1403636584863.555584"}, kWLast), "stamps in milliseconds");
+  expect_last(three({"1.403636584763555584e+18", "1.403636584813555456e+18", "1.403636584863555584e+18"},
+                    " 1.0e+00 2.0e+00 3.0e+00 0 0 7.0710678e-01 7.0710678e-01"), "stamps in nanoseconds");  // numpy
+  expect_last(three(kSeconds, kWLast + " 1e-6 0 1e-6", "  \r\n"), "3 further columns left out");          // OpenVINS
+  expect_last("num,t,x,y,z,qx,qy,qz,qw\n" + three({"0,1403636584.763555", "1,1403636584.813555", "2,1403636584.863555584"},
+                                                  ",1,2,3,0,0,0.70710678,0.70710678"),
+              "a running number before the stamp, stamps in seconds, quaternions x y z w");
+}
+
+TEST(Trajectory, OrderOfTheQuaternionIsSaidWhereItIsAssumed) {
+  const std::string commas = ",1,2,3,0,0,0.70710678,0.70710678", semicolons = ";1;2;3;0;0;0.70710678;0.70710678";
+  expect_last(three(kSeconds, commas), "stamps in seconds, quaternions x y z w (if that is wrong: --format wxyz)");
+  expect_last(three(kSeconds, semicolons),
+              "columns between semicolons, stamps in seconds, quaternions x y z w (if that is wrong: --format wxyz)");
+  expect_last(three(kSeconds, kWFirst), "stamps in seconds", *parse_trajectory_format("s,wxyz"));
+  expect_last("t,x,y,z,qw,qx,qy,qz\n" + three(kSeconds, kWFirst), "stamps in seconds");
+  EXPECT_EQ(parse_trajectory_format("zyxw").error().message, "'zyxw' is neither ns, us, ms, s, wxyz nor xyzw");
+}
+
+TEST(Trajectory, RowsWithNaNAreCountedHoweverMany) {
+  std::string text = kSeconds[0] + kWLast + "\n";
+  for (int i = 0; i < 5; ++i) text += fmt::format("14036365{}.5 nan nan nan nan nan nan nan\n", 85 + i);
+  const auto file = parse_trajectory(text, "t");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->points.size(), 1u);
+  EXPECT_EQ(file->counts.not_finite, 5);
+}
+
+TEST(Trajectory, KittisPosesHaveNoTimes) {
+  const auto file = parse_trajectory("1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n", "00.txt");
+  ASSERT_FALSE(file.ok());
+  EXPECT_NE(file.error().message.find("00.txt: looks like KITTI's poses"), std::string::npos) << file.error().message;
 }
 
 }  // namespace trajectory_test

@@ -76,7 +76,7 @@ std::optional<LivePose> PosePropagator::add(const ImuSample& reading) {
     if (since_->dt_s() > kLongest_s) since_.reset();
   }
   if (!since_) newest_t_ = t;
-  return newest_pose(t, reading.gyro_radps);
+  return newest_pose(t, readings_.newest().gyro_radps);
 }
 
 LivePose PosePropagator::newest_pose(Time t, const Vec3& gyro_radps) const {
