@@ -119,6 +119,9 @@ Result<TrajectoryLayout> recognise(const std::vector<CsvLine>& data, std::string
   for (const auto& row : rows)
     if (row.size() > layout.stamp && std::isfinite(row[layout.stamp])) stamps.push_back(row[layout.stamp]);
   const bool euroc = layout.separator != ' ' && whole && layout.stamp == 0;
+  if (euroc && layout.columns > kPose && layout.columns != kPoseAndVelocity && layout.columns < kState)
+    return Error{ErrorCode::malformed, fmt::format("{}:{}: {} columns where {}, {} or at least {} are needed", file, data.front().number,
+                                                   layout.columns, kPose, kPoseAndVelocity, kState)};
   layout.unit_ns = wanted.unit_ns > 0 ? wanted.unit_ns : unit_of(stamps, euroc ? 1 : 1e9);
   const std::optional<bool> named = w_first_by(header);
   layout.w_first = wanted.w_first.value_or(named.value_or(euroc));
