@@ -24,6 +24,8 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kTrouble_s = 2;
 /// Otherwise so many times what a good pose may owe is made up for at once.
 constexpr double kAtOnce = 2;
+/// Share by which an accelerometer's axes and scale are off, of a sensor that was not calibrated up to twice as much.
+constexpr double kAxes = 0.015;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.15;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
@@ -48,7 +50,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
-      reading_noise_(imu_noise_),
+      reading_noise_(imu_noise_, options.accel_unmodelled_mps2_rthz > 0 ? kAxes : 0),
       monitor_(imu_noise_, weights_of(options_).calibrating()),
       window_(options_, weights_of(options, !one_camera_)),
       published_(options.max_step_m, options.max_pending_m) {}

@@ -22,7 +22,7 @@ constexpr double kNearest_m = 0.3;
 /// What all residuals of an image have in common, on average where all is well: EuRoC's MH_01. A rig whose lens, axes and clocks are known
 /// less well has more, and is given as many times the room, up to a limit; learned from images that are in no contradiction.
 constexpr double kUsualShift = 0.17, kMostRoom = 3, kLargestLearned = 1;
-constexpr double kLearnedAtFirst_s = 1, kLearnedOver_s = 30;
+constexpr double kLearnedAtFirst_s = 2, kLearnedOver_s = 30;
 /// Where the images' own pose does not explain them much better, the prediction is not what is wrong.
 constexpr double kBetter = 0.6;
 /// Share of the landmarks that agree with one pose where images can be right against the readings.

@@ -108,7 +108,7 @@ TEST(Level, IsReportedWhenTheTiltIsKnown) {
   Estimator estimator(flight.rig, exact);
   bool was_level = false;
   int unknown = 0;
-  for (int k = 0; k < 400; ++k) {
+  for (int k = 0; k < 800; ++k) {
     const Odometry o = estimator.process(flight.frame(k)).odometry;
     if (!o.health.has_pose()) continue;
     const double error = tilt_error(o.T_WB.q, flight.truth(k).T_FB.q);

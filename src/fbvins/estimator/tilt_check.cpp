@@ -19,18 +19,17 @@ constexpr double kBegun_s = 2;
 constexpr double kRemembered_s = 30;
 
 /// A change of a bias in standard deviations, of which `floor` is the least. Of a consistent estimate the covariance of a change
-/// is what it gained or lost meanwhile; while it is still uncertain, errors of linearisation move it by as much as it is uncertain.
-double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, double floor) {
+/// is what it gained or lost meanwhile, and `uncertain` more: errors of linearisation.
+double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, double floor, double uncertain) {
   const Eigen::SelfAdjointEigenSolver<Mat3> gained(before - after);
   const Vec3 along = gained.eigenvectors().transpose() * change;
-  const double uncertain = after.trace() / 3;
   return std::sqrt((along.array().square() / (gained.eigenvalues().array().abs() + uncertain + floor * floor)).sum());
 }
 
 bool moved(const BiasEstimate& from, const BiasEstimate& to, double accel_mps2, double gyro_radps) {
-  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma) >
+  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma, to.accel.trace() / 3) >
              kMoved_sigma ||
-         change_sigma(to.bias.gyro_radps - from.bias.gyro_radps, from.gyro, to.gyro, gyro_radps / kMoved_sigma) > kMoved_sigma;
+         change_sigma(to.bias.gyro_radps - from.bias.gyro_radps, from.gyro, to.gyro, gyro_radps / kMoved_sigma, 0) > kMoved_sigma;
 }
 
 }  // namespace

@@ -12,9 +12,8 @@ constexpr double kMeasured_s = 0.25;
 /// hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md) and whose
 /// readings have 2.7e-3 and 0.07.
 constexpr double kGyroShare = 0.25, kAccelShare = 1;
-/// Axes and scale of an accelerometer are off by this share (of an IMU that was not calibrated by up to 3 %);
-/// what they make of a specific force that changes is wrong for as long as a motion lasts.
-constexpr double kAxes = 0.015, kMotion_s = 0.3, kMean_s = 1;
+/// Axes and scale that are off make an error of a specific force that changes, for as long as a motion lasts.
+constexpr double kMotion_s = 0.3, kMean_s = 1;
 /// Readings that differ much less from one another than the calibrated noise says have less; filters in the sensor hide this part.
 constexpr double kHidden = 3;
 /// For single readings: the highest vibration of these flights, about the median of other vehicles, and of noisy sensors so many
@@ -101,7 +100,7 @@ ImuNoiseScale ReadingNoise::of(const ImuSegment& segment) {
   const double usual_gyro = std::max(kUsualGyro_radps, kUsualNoise * gyro_sigma);
   const double usual_accel = std::max(kUsualAccel_mps2, kUsualNoise * accel_sigma);
   out = {with_vibration(gyro_radps_ / gyro_sigma, kGyroShare), with_vibration(accel_mps2_ / accel_sigma, kAccelShare)};
-  out.accel = std::hypot(out.accel, kAxes * changes_.sigma() * std::sqrt(kMotion_s) / assumed_.accel_noise_density_mps2_rthz);
+  out.accel = std::hypot(out.accel, axes_ * changes_.sigma() * std::sqrt(kMotion_s) / assumed_.accel_noise_density_mps2_rthz);
   // What one reading contributes to the motion, as noise of them all.
   const double root_readings = std::sqrt(static_cast<double>(segment.samples.size()));
   if (worst_gyro_radps_ > kOutlier * std::max(usual_gyro, gyro_radps_))

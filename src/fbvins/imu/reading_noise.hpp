@@ -20,7 +20,8 @@ namespace fbvins {
 
 class ReadingNoise {
  public:
-  explicit ReadingNoise(const ImuNoise& assumed) : assumed_(assumed) {}
+  /// `axes`: the share by which the accelerometer's axes and scale are off; those that are not calibrated by 1 to 3 %.
+  explicit ReadingNoise(const ImuNoise& assumed, double axes = 0.015) : assumed_(assumed), axes_(axes) {}
 
   ImuNoiseScale of(const ImuSegment& segment);
   /// Whether an axis was at the end of its range in the last segment, and in one of the four before.
@@ -44,6 +45,7 @@ class ReadingNoise {
   void add(const ImuSample& reading);
 
   ImuNoise assumed_;
+  double axes_;
   std::deque<ImuSample> last_;  ///< two at most
   std::deque<Difference> differences_;
   Changes changes_;
