@@ -209,7 +209,7 @@ TEST(Estimator, LearningTheTiltDoesNotMoveTheFirstPose) {
   }
   ASSERT_TRUE(first);
   const Pose<W, B> levelled = estimator.window().tilt().levelled(first->gauge.T_GB);
-  EXPECT_GT(levelled.q.angularDistance(first->T_WB.q), 0.015);
+  EXPECT_GT(levelled.q.angularDistance(first->T_WB.q), 0.003);
   EXPECT_LT((levelled.p - first->T_WB.p).norm(), 1e-3);
 }
 

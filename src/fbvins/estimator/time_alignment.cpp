@@ -11,6 +11,8 @@ namespace {
 constexpr int kEachBefore = 2, kEachInFlight = 20;
 /// An offset is corrected where it is certain: by this much, and by so many standard deviations.
 constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
+/// In flight so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
+constexpr int kInARow = 3, kSolvesOfNoise = 20;
 /// A line delay likewise: global shutters stay what they are.
 constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4;
 /// In flight the correction is made in steps: a pose must not lie before the one before it.
@@ -31,19 +33,21 @@ bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   const bool changed = cut_by_ && std::abs((frame.imu.time_offset - *cut_by_).seconds()) > kStep.seconds();
   cut_by_ = frame.imu.time_offset;
   alignment_.add(frame, given_);
-  if (++frames_ % (running ? kEachInFlight : kEachBefore) == 0) solve();
+  if (++frames_ % (running ? kEachInFlight : kEachBefore) == 0) solve(running);
   if (correction_ != found_) changed_ = now_;
   const Duration missing = found_ - correction_;
   correction_ = running ? correction_ + std::clamp(missing, -kStep, kStep) : found_;
   return changed;
 }
 
-void TimeAlignment::solve() {
+void TimeAlignment::solve(bool running) {
   const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
   if (!found) return;
-  jitter_s_ = found->stamp_sigma_s;
+  solves_ = std::min(solves_ + 1, kSolvesOfNoise);
+  jitter_s_ += (found->stamp_sigma_s - jitter_s_) / solves_;
   const double off_s = std::abs(found->time_offset_s() - found_.seconds());
-  if (off_s > kLeast_s && off_s > kCertain_sigma * found->time_offset_sigma_s())
+  off_ = off_s > kLeast_s && off_s > kCertain_sigma * found->time_offset_sigma_s() ? off_ + 1 : 0;
+  if (off_ >= (running ? kInARow : 1))
     found_ = Duration::from_seconds(found->time_offset_s());
   const double line_off_s = std::abs(found->line_delay_s() - line_delay_s_);
   if (line_off_s > kLeastLine_s && line_off_s > kCertainLine_sigma * found->line_delay_sigma_s()) line_delay_s_ = found->line_delay_s();

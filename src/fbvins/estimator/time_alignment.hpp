@@ -34,7 +34,7 @@ class TimeAlignment {
   static constexpr int kFewestForStart = 8;
   /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
   static constexpr int kLongestWait = 40;
-  void solve();
+  void solve(bool running);
 
   bool enabled_;
   Duration given_;
@@ -42,6 +42,7 @@ class TimeAlignment {
   int frames_ = 0;
   Duration correction_{}, found_{};
   double line_delay_s_ = 0, jitter_s_ = 0;
+  int solves_ = 0, off_ = 0;  ///< and those in a row that found the offset off
   std::optional<Time> changed_;  ///< the correction, last
   Time now_;
   std::optional<Duration> cut_by_;
