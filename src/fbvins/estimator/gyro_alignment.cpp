@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/geometry/so3.hpp"
@@ -37,16 +38,16 @@ constexpr double kLeastRms = 0.4;
 /// A pair shows when its image was taken where its tracks say it to this, alone. Where nothing is wrong, pairs of real images are off by
 /// the second in the median.
 constexpr double kLateShows_s = 0.004, kLateUsual_s = 0.0007;
-constexpr std::size_t kFewestLate = 5;
+constexpr std::size_t kFewestLate = 10;
 
 using Vec8 = GyroAlignmentEstimate::Vec;
 
 /// Of each stamp, by what the pairs are off by: two stamps each. The median hides single images that are late.
-double stamp_sigma(std::vector<double> late_s) {
+double stamp_sigma(std::vector<double> late_s, std::vector<double> known_s2, double rms) {
   if (late_s.size() < kFewestLate) return 0;
   for (double& late : late_s) late = std::abs(late);
   const double sigma = 1.4826 * median(late_s), usual = 1.4826 * kLateUsual_s;
-  return std::sqrt(std::max(0.0, sigma * sigma - usual * usual) / 2);
+  return std::sqrt(std::max(0.0, sigma * sigma - usual * usual - rms * rms * median(known_s2)) / 2);
 }
 
 Vec8 information(const GyroAlignmentPrior& p) {
@@ -189,7 +190,7 @@ void GyroAlignment::add_pair(const Pair& pair, const Vec8& x, Normal& out) const
   const Eigen::Matrix<double, 8, 2> gain = X * V.inverse();
   const Mat2 V_inverse = V.inverse();
   H_late -= X_late.dot(V_inverse * X_late), g_late -= X_late.dot(V_inverse * w);
-  if (H_late > 1 / (kLateShows_s * kLateShows_s)) out.late_s.push_back(-g_late / H_late);
+  if (H_late > 1 / (kLateShows_s * kLateShows_s)) out.late_s.push_back(-g_late / H_late), out.known_s2.push_back(1 / H_late);
   out.H -= gain * X.transpose();
   out.g -= gain * w;
   out.rows -= 2;
@@ -209,7 +210,7 @@ GyroAlignmentEstimate GyroAlignment::solve_from(double time_offset_s) const {
   for (int i = 0; i < kIterations; ++i) {
     Normal normal = linearise(out.x);
     out.rms = std::sqrt(normal.cost / std::max(1, normal.rows));
-    out.stamp_sigma_s = stamp_sigma(normal.late_s);
+    out.stamp_sigma_s = stamp_sigma(std::move(normal.late_s), std::move(normal.known_s2), out.rms);
     const double rms = std::max(kLeastRms, out.rms), scale = 1 / (kShared * rms * rms);
     const GyroAlignmentEstimate::Mat H = scale * normal.H + GyroAlignmentEstimate::Mat(prior.asDiagonal());
     const Eigen::LDLT<GyroAlignmentEstimate::Mat> ldlt(H);

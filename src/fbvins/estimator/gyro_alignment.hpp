@@ -89,7 +89,8 @@ class GyroAlignment {
     GyroAlignmentEstimate::Vec g = GyroAlignmentEstimate::Vec::Zero();
     double cost = 0;
     int rows = 0;
-    std::vector<double> late_s;  ///< what each pair's second stamp is off by, where it shows
+    std::vector<double> late_s;    ///< what each pair's second stamp is off by, where it shows
+    std::vector<double> known_s2;  ///< and the variance of that by the noise of tracks that fit as well as assumed
   };
 
   void add_readings(const ImuSegment& segment);
