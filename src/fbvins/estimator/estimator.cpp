@@ -192,7 +192,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   const Duration dt = frame.t - window_.newest().t;
   ImuSegment imu = frame.imu;
   imu.noise = reading_noise_.of(imu);
-  add_stamp_noise(imu);
+  if (!frame.features.empty()) add_stamp_noise(imu);
   Frame predicted = predict(frame, imu);
   const std::vector<TrackedFeature> features = check_readings(frame, imu, predicted);
   out.imu_noise = imu.noise;

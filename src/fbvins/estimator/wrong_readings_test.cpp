@@ -43,7 +43,7 @@ Flown fly_with_drift(const Vec3& drift_radps2) {
 }
 
 TEST(WrongReadings, AGyroscopeThatDriftsIsSeenBeforeItHasMovedThePoseFar) {
-  const Flown flown = fly_with_drift(Vec3(0, 0.02, 0));
+  const Flown flown = fly_with_drift(Vec3(0, 0.03, 0));
   int seen = kFrom;
   while (seen < kTo && flown.odometry[seen].health.reason != HealthReason::contradiction) ++seen;
   EXPECT_LT(seen, kTo);
@@ -58,7 +58,7 @@ TEST(WrongReadings, AGyroscopeThatDriftsIsSeenBeforeItHasMovedThePoseFar) {
 
 /// A start may be as wrong as what ended the window before.
 TEST(WrongReadings, AfterARestartInAContradictionImagesAndReadingsHaveToAgreeForASecond) {
-  const Flown flown = fly_with_drift(Vec3(-0.03, 0, 0));
+  const Flown flown = fly_with_drift(Vec3(-0.06, 0, 0));
   const auto is = [](HealthState state) { return [state](const Odometry& o) { return o.health.state == state; }; };
   const auto lost = std::find_if(flown.odometry.begin(), flown.odometry.end(), is(HealthState::lost));
   ASSERT_NE(lost, flown.odometry.end());
