@@ -69,7 +69,7 @@ struct EstimatorOptions {
   int max_iterations = 4;
   int max_landmarks = 300;
   double gravity_mps2 = 9.81;
-  double gyro_noise_scale = 1;
+  double gyro_noise_scale = 1;  ///< set by tests
   double accel_noise_scale = 1;
   double gyro_unmodelled_radps_rthz = 3.5e-4;  ///< what axes and scale leave, in addition to the calibrated noise; set by tests
   double accel_unmodelled_mps2_rthz = 0.005;    ///< likewise
@@ -79,7 +79,6 @@ struct EstimatorOptions {
   bool estimate_time_offset = false;
   bool estimate_line_delay = false;
   bool align_time_offset = true;
-  double max_start_scale_sigma = 0.15;
   double max_blind_m = 0.5;
   double max_imu_gap_s = 1.0;
   int min_tracks = 10;
@@ -108,14 +107,11 @@ struct EstimatorOptions {
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);
-    v("gyro_noise_scale", gyro_noise_scale, "", "factor on the calibrated gyroscope noise density", 0.1, 100.0);
     v("accel_noise_scale", accel_noise_scale, "", "factor on the calibrated accelerometer noise density", 0.1, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
     v("align_time_offset", align_time_offset, "",
       "find a time offset between images and IMU that the calibration does not know, up to 0.1 s, by gyroscope and tracks");
-    v("max_start_scale_sigma", max_start_scale_sigma, "",
-      "one camera: the largest relative standard deviation of the scale of a pose called good soon after the start", 0.01, 1.0);
     v("estimate_line_delay", estimate_line_delay, "", "refine the line delay of a rolling shutter while flying");
     v("max_blind_m", max_blind_m, "m",
       "largest standard deviation that flight by the IMU alone, without usable images, may add to the position", 0.01, 100.0);

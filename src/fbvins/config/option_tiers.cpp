@@ -16,7 +16,6 @@ std::span<const std::string_view> user_options() {
                                         "estimator.known_landmarks.enabled"sv,
                                         "estimator.max_iterations"sv,
                                         "estimator.gravity_mps2"sv,
-                                        "estimator.gyro_noise_scale"sv,
                                         "estimator.accel_noise_scale"sv,
                                         "estimator.estimate_extrinsics"sv,
                                         "estimator.estimate_time_offset"sv,
