@@ -48,7 +48,7 @@ class Camera {
   int height() const { return height_; }
   /// Of a lens of one's own the pinhole with its focal lengths and centre.
   const LensModel& model() const { return model_; }
-  /// pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan, pinhole-radtan5 or pinhole-rational; of a lens of one's own its
+  /// pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan, pinhole-radtan5 or pinhole-rational; of a custom lens its
   /// name.
   std::string model_name() const;
   /// fx, fy, cx, cy, px.

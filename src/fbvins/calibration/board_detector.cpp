@@ -52,7 +52,7 @@ BoardDetection BoardDetector::find(const ImageView& image) {
   for (const TagDetection& tag : seen.tags) {
     const double side_px = shortest_side_px(tag);
     if (side_px < kSmallestTag_px) continue;
-    // No other edge within: the border's inner one is as far from the tag's edge as it is wide, the square's between the tags its
+    // The search must not reach another edge: the border's inner edge is one border width away, that of the squares between the tags its
     // own width.
     const double border = static_cast<double>(tag.border) / cells_across(tag.border);
     const double radius_px = std::clamp(side_px * std::min(border, board_.spacing), 2.0, kLargestRadius_px);

@@ -5,7 +5,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "fbvins/core/median.hpp"
@@ -187,8 +186,8 @@ void GyroAlignment::add_pair(const Pair& pair, const Vec8& x, Normal& out) const
     out.cost += robust.weight * r * r;
     ++out.rows;
   }
-  const Eigen::Matrix<double, 8, 2> gain = X * V.inverse();
   const Mat2 V_inverse = V.inverse();
+  const Eigen::Matrix<double, 8, 2> gain = X * V_inverse;
   H_late -= X_late.dot(V_inverse * X_late), g_late -= X_late.dot(V_inverse * w);
   if (H_late > 1 / (kLateShows_s * kLateShows_s)) out.late_s.push_back(-g_late / H_late), out.known_s2.push_back(1 / H_late);
   out.H -= gain * X.transpose();
