@@ -24,6 +24,7 @@
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/imu_file.hpp"
+#include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins::app {
