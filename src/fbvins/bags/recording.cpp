@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "fbvins/bags/bag_contents.hpp"
+#include "fbvins/bags/bag_loader.hpp"
 #include "fbvins/bags/calibration.hpp"
-#include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
@@ -23,7 +23,6 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
-#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
@@ -37,78 +36,6 @@ constexpr Duration kImuLeadIn = {1'000'000'000};
 // Messages are recorded later than they are stamped, some of them by seconds.
 constexpr Duration kRecordingDelay = {2'000'000'000};
 constexpr Duration kForever = {std::int64_t{1} << 62};
-
-class BagLoader : public FrameLoader {
- public:
-  struct Sensor {
-    Camera camera;  ///< of a depth sensor: that whose pixels it has
-    Encoding encoding;
-    bool compressed;
-  };
-  BagLoader(std::unique_ptr<BagReader> bag, std::string name, std::vector<Sensor> cameras, std::optional<Sensor> depth)
-      : bag_(std::move(bag)), name_(std::move(name)), cameras_(std::move(cameras)), depth_(std::move(depth)) {}
-
-  /// Cameras of 10 and 12 bits send these in 16, where the upper eight would be almost black: finds how many are used in all
-  /// cameras together, from images spread over the recording, so that all its images are scaled alike.
-  int find_used_bits(const std::vector<FrameEntry>& frames) {
-    std::uint16_t largest = 0;
-    for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      if (cameras_[i].compressed) continue;
-      for (const std::string& place : images_to_try(frames, [&](const FrameEntry& f) { return f.file(static_cast<int>(i)); }))
-        largest = std::max(largest, largest_value_of(bag_->read(place_of(place)), cameras_[i].encoding).value_or(0));
-    }
-    return used_bits_ = bits_used_for(largest);
-  }
-
-  LoadedFrame load(const FrameEntry& entry) override {
-    LoadedFrame out;
-    out.frame.t = entry.t;
-    out.frame.offsets = entry.offsets;
-    out.frame.more.resize(entry.more_files.size());
-    for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      const auto read = [&](const Sensor& s, std::string_view bytes) {
-        return image_of(bytes, s.encoding, s.compressed, used_bits_);
-      };
-      ImageCounts& counts = i == 0 ? out.left : i == 1 ? out.right : out.more;
-      if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, counts, out))
-        (i == 0 ? out.frame.left : i == 1 ? out.frame.right : out.frame.more[i - 2]) = std::move(image);
-    }
-    if (!depth_) return out;
-    const auto read = [](const Sensor& s, std::string_view bytes) { return depth_of(bytes, s.encoding, s.compressed); };
-    out.frame.depth = load_image<DepthImage>(entry.depth_file, *depth_, read, out.depth, out);
-    return out;
-  }
-
- private:
-  static std::pair<int, int> size_of(const Image& image) { return {image.width(), image.height()}; }
-  static std::pair<int, int> size_of(const DepthImage& image) { return {image.width, image.height}; }
-
-  template <class T, class Read>
-  std::shared_ptr<const T> load_image(const std::string& place, const Sensor& sensor, Read&& read, ImageCounts& counts,
-                                      LoadedFrame& loaded) {
-    if (place.empty()) return nullptr;
-    std::string& problem = loaded.problem;
-    const auto blame = [&](int& count, const std::string& sentence) {
-      ++count;
-      if (problem.empty()) problem = fmt::format("{}: image at {}: {}", name_, place, sentence);
-      return nullptr;
-    };
-    Result<T> image = read(sensor, bag_->read(place_of(place)));
-    if (!image) return blame(counts.corrupt, image.error().message);
-    const auto [width, height] = size_of(*image);
-    if (const auto sentence = wrong_size(width, height, sensor.camera)) {
-      loaded.other_size = ImageSize{width, height};
-      return blame(counts.wrong_size, *sentence);
-    }
-    return std::make_shared<const T>(*std::move(image));
-  }
-
-  std::unique_ptr<BagReader> bag_;
-  std::string name_;
-  std::vector<Sensor> cameras_;
-  std::optional<Sensor> depth_;
-  int used_bits_ = 16;
-};
 
 /// Makes a recording of a bag step by step.
 class BagRecording {
