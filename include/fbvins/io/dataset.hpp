@@ -140,6 +140,7 @@ class Dataset {
   bool deliver_rest_ = true;  ///< IMU samples after the last image
   std::size_t next_imu_ = 0;
   std::size_t next_frame_ = 0;
+  std::size_t next_clock_step_ = 0;
   bool begun_ = false, at_end_ = false;
 };
 

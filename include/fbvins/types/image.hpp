@@ -119,6 +119,7 @@ struct StereoFrame {
   std::vector<std::shared_ptr<const Image>> more = {};
   std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
   ExposureOffsets offsets = {};
+  bool after_clock_step = false;  ///< the first one since the clock stepped back: nobody knows how much time has passed
 
   std::shared_ptr<const Image> image(int camera) const {
     if (camera < 2) return camera == 0 ? left : right;

@@ -100,6 +100,7 @@ struct TrackedFrame {
   ExposureOffsets offsets = {};                      ///< of the cameras' images; filled by the system
   std::array<std::uint8_t, 8> covered_percent = {};  ///< as in Health; filled by the system
   std::vector<Anchor> anchors = {};                  ///< for the map
+  bool after_clock_step = false;                     ///< as in StereoFrame; filled by the system
 };
 
 /// A landmark with its last estimated position.

@@ -71,6 +71,7 @@ Result<CameraRecording> open_camera_bag(const std::string& path, const std::vect
   CameraRecording out;
   out.cameras = chosen->cameras;
   out.imu_name = chosen->imu;
+  out.warnings = continue_clock(contents, *chosen).said;
   auto images = std::make_shared<BagImages>();
   for (const std::string& topic : out.cameras) {
     ImageTopic& of = contents.images.at(topic);

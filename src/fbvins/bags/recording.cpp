@@ -53,7 +53,8 @@ class BagRecording {
     }
     contents_ = read_contents(*bag, {}, options_.by_recording);
     for (auto step :
-         {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
+         {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::continue_stamps, &BagRecording::calibrate,
+          &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
       if (Result<void> done = (this->*step)(); !done)
         return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
     describe_bag(*bag);
@@ -90,6 +91,13 @@ class BagRecording {
     for (const std::string& topic : {topics_.imu, topics_.accel})
       if (const auto imu = contents_.imu.find(topic); imu != contents_.imu.end())
         if (Result<void> good = check(topic, imu->second.samples, "readings"); !good) return good;
+    return {};
+  }
+
+  Result<void> continue_stamps() {
+    JoinedClock clock = continue_clock(contents_, topics_);
+    for (std::string& sentence : clock.said) out_.info.warnings.push_back(fmt::format("{}: {}", path_, sentence));
+    out_.info.clock_steps = std::move(clock.begins);
     return {};
   }
 

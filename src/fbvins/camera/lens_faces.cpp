@@ -165,6 +165,7 @@ std::shared_ptr<const Image> LensFaces::part(const std::shared_ptr<const Image>&
 StereoFrame LensFaces::spread(StereoFrame frame) const {
   if (!any()) return frame;
   StereoFrame out{frame.t, part(frame.left, 0), nullptr};
+  out.after_clock_step = frame.after_clock_step;
   for (int i = 0; i < rig_.camera_count(); ++i) {
     const std::shared_ptr<const Image> image = i == 0 ? nullptr : part(frame.image(lens_of(i)), i);
     if (i == 1) out.right = image;

@@ -47,9 +47,11 @@ class Estimator {
 
   /// The state at the frame's stamp; health says whether it may be trusted.
   Estimate process(const TrackedFrame& tracked);
-  /// As after `lost`: a new start, in a W placed at the last pose. Before the first start nothing.
+  /// As after `lost`: a new start, in a W placed at the last pose. Before the first start what was gathered for it is forgotten.
   void start_again() {
-    if (running_) restart();
+    if (running_) return restart();
+    initialiser_.reset();
+    rest_.reset();
   }
 
   /// For the frontend: the newest state, in G; not valid before initialisation.

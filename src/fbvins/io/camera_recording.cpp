@@ -8,14 +8,14 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/euroc_rows.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargestCsv_bytes = std::uint64_t{1} << 30u, kLargestImage_bytes = std::uint64_t{1} << 28u,
-                        kLargestYaml_bytes = 1u << 20u;
+constexpr std::uint64_t kLargestImage_bytes = std::uint64_t{1} << 28u, kLargestYaml_bytes = 1u << 20u;
 
 /// Reads a EuRoC folder step by step.
 class EurocCameras {
@@ -23,9 +23,16 @@ class EurocCameras {
   EurocCameras(std::shared_ptr<const FileSource> files, std::string root) : files_(std::move(files)), root_(std::move(root)) {}
 
   Result<CameraRecording> read() {
+    EurocSensors sensors;
     for (int k = 0; k < kMostCameras && files_->exists(fmt::format("{}cam{}/data.csv", root_, k)); ++k)
-      if (Result<void> done = list_camera(k); !done) return done.error();
-    if (Result<void> done = read_imu(); !done) return done.error();
+      sensors.cameras.push_back(fmt::format("cam{}/", k));
+    sensors.imu = files_->exists(root_ + "imu0/data.csv");
+    Result<EurocRows> rows = read_euroc_rows(*files_, root_, sensors);
+    if (!rows) return rows.error();
+    out_.warnings = rows->clock.said;
+    for (std::size_t k = 0; k < rows->cameras.size(); ++k) list_camera(static_cast<int>(k), sensors.cameras[k], rows->cameras[k].rows);
+    if (sensors.imu)
+      if (Result<void> done = take_imu(std::move(rows->imu.rows)); !done) return done.error();
     sort_by_time(out_.images);
     out_.take = [files = files_, images = out_.images](std::size_t index) -> CameraRecording::Decode {
       Result<std::string> bytes = files->read(images[index].name, kLargestImage_bytes);
@@ -36,26 +43,15 @@ class EurocCameras {
   }
 
  private:
-  Result<void> list_camera(int camera) {
-    const std::string folder = fmt::format("{}cam{}/", root_, camera);
-    Result<std::string> csv = files_->read(folder + "data.csv", kLargestCsv_bytes);
-    if (!csv) return csv.error();
-    auto rows = read_image_rows(*csv, files_->describe(folder + "data.csv"));
-    if (!rows) return rows.error();
-    for (const ImageRow& row : rows->rows) out_.images.push_back({row.t, camera, folder + "data/" + row.file});
+  void list_camera(int camera, const std::string& folder, const std::vector<ImageRow>& rows) {
+    for (const ImageRow& row : rows) out_.images.push_back({row.t, camera, root_ + folder + "data/" + row.file});
     out_.cameras.push_back(fmt::format("cam{}", camera));
-    return {};
   }
 
-  Result<void> read_imu() {
-    const std::string csv_file = root_ + "imu0/data.csv", yaml_file = root_ + "imu0/sensor.yaml";
-    if (!files_->exists(csv_file)) return {};
-    Result<std::string> csv = files_->read(csv_file, kLargestCsv_bytes);
-    if (!csv) return csv.error();
-    auto rows = read_stamped_rows<ImuSample>(*csv, files_->describe(csv_file), ImuRowParser{});
-    if (!rows) return rows.error();
+  Result<void> take_imu(std::vector<ImuSample> readings) {
+    const std::string yaml_file = root_ + "imu0/sensor.yaml";
     out_.imu_name = "imu0";
-    out_.imu = std::move(rows->rows);
+    out_.imu = std::move(readings);
     if (!files_->exists(yaml_file)) return {};
     Result<std::string> yaml = files_->read(yaml_file, kLargestYaml_bytes);
     if (!yaml) return yaml.error();

@@ -90,20 +90,6 @@ std::vector<bool> longest_increasing(const std::vector<Time>& stamps) {
   return keep;
 }
 
-int continue_wrapped(std::vector<Time>& stamps) {
-  constexpr Duration kWrap{(std::int64_t{1} << 32u) * 1000}, kLongestGap{10'000'000'000};
-  int wraps = 0;
-  Duration ahead{};
-  for (std::size_t i = 1; i < stamps.size(); ++i) {
-    const Duration step = stamps[i] + ahead - stamps[i - 1];
-    // Two rows on the other side, or the file's last: one row alone is damage.
-    const bool goes_on = i + 1 == stamps.size() || std::abs((stamps[i + 1] - stamps[i]).ns) < kLongestGap.ns;
-    if (step.ns < kLongestGap.ns - kWrap.ns && step.ns > -kWrap.ns && goes_on) ahead = ahead + kWrap, ++wraps;
-    stamps[i] = stamps[i] + ahead;
-  }
-  return wraps;
-}
-
 Result<void> judge(const RowCounts& counts, const std::string& file) {
   if (counts.rows == 0) return Error{ErrorCode::malformed, fmt::format("{}: there are no data rows in it", file)};
   if (2 * counts.bad() > counts.rows)

@@ -19,6 +19,7 @@
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
+#include "fbvins/io/clock_steps.hpp"
 #include "fbvins/io/row_counts.hpp"
 
 namespace fbvins {
@@ -57,59 +58,82 @@ RowVerdict parse_doubles(const std::vector<std::string_view>& fields, std::size_
 /// far future costs one row and not all that follow. The first of equal stamps is kept.
 std::vector<bool> longest_increasing(const std::vector<Time>& stamps);
 
-/// Continues stamps of a counter of 32 bits of microseconds that began again at 0: from each step back by 4294.967296 s, less at
-/// most 10 s, on. Returns how often that was. All other steps back stay as they are.
-int continue_wrapped(std::vector<Time>& stamps);
-
 /// An error if there are no rows or fewer than half of them are good.
 Result<void> judge(const RowCounts& counts, const std::string& file);
 
-/// Reads all lines with parse(line, row, problem) -> RowVerdict, `problem` saying what is
-/// wrong in words; Row needs a member `Time t`.
-template <class Row, class Parse>
-Result<StampedRows<Row>> read_stamped_lines(const std::vector<CsvLine>& data, const std::string& file, Parse&& parse) {
-  StampedRows<Row> out;
-  RowCounts& counts = out.counts;
+/// The good rows of a file in the order of its lines, of which some stamps may go back.
+template <class Row>
+struct ParsedRows {
+  std::string file;
+  std::vector<Row> rows;
+  std::vector<int> lines;  ///< of each row
+  RowCounts counts;
   int first_bad_line = 0;
-  const auto blame = [&](int line, std::string_view problem) {
+
+  void blame(int line, std::string_view problem) {
     if (first_bad_line != 0 && first_bad_line <= line) return;
     first_bad_line = line;
     counts.first_bad = fmt::format("{}:{}: {}", file, line, problem);
-  };
-  std::vector<Row> rows;
-  std::vector<Time> stamps;
-  std::vector<int> lines;
+  }
+  std::vector<Time> stamps() const {
+    std::vector<Time> out;
+    for (const Row& row : rows) out.push_back(row.t);
+    return out;
+  }
+};
+
+/// Reads all lines with parse(line, row, problem) -> RowVerdict, `problem` saying what is
+/// wrong in words; Row needs a member `Time t`. Counters that wrapped are continued.
+template <class Row, class Parse>
+ParsedRows<Row> parse_stamped_lines(const std::vector<CsvLine>& data, const std::string& file, Parse&& parse) {
+  ParsedRows<Row> out;
+  out.file = file;
   std::string problem;
   for (const CsvLine& line : data) {
-    ++counts.rows;
+    ++out.counts.rows;
     Row row{};
     problem.clear();
     const RowVerdict verdict = parse(line.text, row, problem);
     if (verdict == RowVerdict::good) {
-      rows.push_back(std::move(row));
-      stamps.push_back(rows.back().t);
-      lines.push_back(line.number);
+      out.rows.push_back(std::move(row));
+      out.lines.push_back(line.number);
       continue;
     }
-    ++(verdict == RowVerdict::malformed ? counts.malformed : counts.not_finite);
-    blame(line.number, problem);
+    ++(verdict == RowVerdict::malformed ? out.counts.malformed : out.counts.not_finite);
+    out.blame(line.number, problem);
   }
-  counts.wraps = continue_wrapped(stamps);
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].t = stamps[i];
-  const std::vector<bool> keep = longest_increasing(stamps);
+  std::vector<Time> stamps = out.stamps();
+  out.counts.wraps = continue_wrapped(stamps);
+  for (std::size_t i = 0; i < stamps.size(); ++i) out.rows[i].t = stamps[i];
+  return out;
+}
+
+/// Leaves out rows whose stamps are out of order, or were there before.
+template <class Row>
+Result<StampedRows<Row>> in_order(ParsedRows<Row> parsed) {
+  StampedRows<Row> out;
+  const std::vector<bool> keep = longest_increasing(parsed.stamps());
   Time previous{-1};
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+  for (std::size_t i = 0; i < parsed.rows.size(); ++i) {
+    Row& row = parsed.rows[i];
     if (keep[i]) {
-      previous = stamps[i];
-      out.rows.push_back(std::move(rows[i]));
+      previous = row.t;
+      out.rows.push_back(std::move(row));
     } else {
-      const bool duplicate = stamps[i] == previous;
-      ++(duplicate ? counts.duplicates : counts.backwards);
-      blame(lines[i], duplicate ? "the stamp was already there" : "the stamp is out of order");
+      const bool duplicate = row.t == previous;
+      ++(duplicate ? parsed.counts.duplicates : parsed.counts.backwards);
+      parsed.blame(parsed.lines[i], duplicate ? "the stamp was already there" : "the stamp is out of order");
     }
   }
-  if (Result<void> verdict = judge(counts, file); !verdict) return verdict.error();
+  if (Result<void> verdict = judge(parsed.counts, parsed.file); !verdict) return verdict.error();
+  out.counts = std::move(parsed.counts);
   return out;
+}
+
+/// Both of them.
+template <class Row, class Parse>
+Result<StampedRows<Row>> read_stamped_lines(const std::vector<CsvLine>& data, const std::string& file, Parse&& parse) {
+  return in_order(parse_stamped_lines<Row>(data, file, std::forward<Parse>(parse)));
 }
 
 /// The same of a whole file without its header.

@@ -86,7 +86,11 @@ std::optional<SensorEvent> Dataset::next() {
       at_end_ = true;
       return std::nullopt;
     }
-    if (auto frame = next_frame()) return *std::move(frame);
+    auto frame = next_frame();
+    if (!frame) continue;
+    const std::vector<Time>& steps = contents_.info.clock_steps;
+    for (; next_clock_step_ < steps.size() && steps[next_clock_step_] <= frame->t; ++next_clock_step_) frame->after_clock_step = true;
+    return *std::move(frame);
   }
 }
 

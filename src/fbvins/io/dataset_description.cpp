@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "fbvins/io/calibration_doubts.hpp"
+#include "fbvins/io/clock_steps.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -27,7 +29,21 @@ void warn_about_gap(const Intervals& intervals, const char* what, std::vector<st
                                    format_seconds(intervals.longest_start)));
 }
 
-void describe_imu(const std::vector<ImuSample>& imu, DatasetInfo& info) {
+/// Below the first the turns of a hand or a vehicle lie between two readings; below the second no estimate begins.
+constexpr double kFewest_hz = 50, kTooFew_hz = 22;
+/// Of a calibration's rate to the measured one.
+constexpr double kOtherRate = 1.5;
+
+void warn_about_rate(double measured_hz, double declared_hz, std::vector<std::string>& warnings) {
+  if (!(measured_hz > 0) || measured_hz >= kFewest_hz) return;
+  const bool other = declared_hz > kOtherRate * measured_hz;
+  warnings.push_back(fmt::format("IMU: {:.3g} readings a second{}, {}: set the sensor to 100 to 400 Hz", measured_hz,
+                                 other ? fmt::format(" where {:.3g} are declared", declared_hz) : "",
+                                 measured_hz < kTooFew_hz ? "too few for an estimate (`imu_gap`, `alignment_refused`)"
+                                                          : "between which the motion is hardly known"));
+}
+
+void describe_imu(const std::vector<ImuSample>& imu, double declared_hz, DatasetInfo& info) {
   info.imu_samples = static_cast<int>(imu.size());
   if (imu.empty()) {
     info.warnings.emplace_back("there is no IMU in the recording");
@@ -41,6 +57,7 @@ void describe_imu(const std::vector<ImuSample>& imu, DatasetInfo& info) {
   info.longest_imu_gap = intervals.longest;
   info.longest_imu_gap_start = intervals.longest_start;
   warn_about_gap(intervals, "IMU", info.warnings);
+  warn_about_rate(info.imu_rate_hz, declared_hz, info.warnings);
 }
 
 }  // namespace
@@ -71,8 +88,20 @@ void describe(DatasetContents& contents) {
   info.longest_image_gap = images.longest;
   info.longest_image_gap_start = images.longest_start;
   warn_about_gap(images, "images", info.warnings);
-  describe_imu(contents.imu, info);
+  describe_imu(contents.imu, contents.rig.imu_noise.rate_hz, info);
   for (std::string& doubt : calibration_doubts(contents.rig)) info.warnings.push_back(std::move(doubt));
+}
+
+void continue_stamps(DatasetContents& contents, const std::string& name) {
+  StampStream frames = stream_of("images", contents.frames), readings = stream_of("IMU readings", contents.imu);
+  JoinedClock clock = join_clock({&frames, &readings});
+  take_clock(frames, contents.frames);
+  take_clock(readings, contents.imu);
+  for (FrameEntry& frame : contents.frames)
+    if (frame.imu_before) frame.imu_before = std::min(*frame.imu_before, contents.imu.size());
+  follow_clock(clock, contents.ground_truth);
+  for (const std::string& sentence : clock.said) contents.info.warnings.push_back(fmt::format("{}: {}", name, sentence));
+  contents.info.clock_steps = std::move(clock.begins);
 }
 
 void warn_of_silent_cameras(DatasetContents& contents) {

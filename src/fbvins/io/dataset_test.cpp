@@ -6,6 +6,9 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <string>
+
+#include "fbvins/io/dataset_description.hpp"
 
 namespace fbvins {
 namespace dataset_test {
@@ -91,6 +94,25 @@ TEST(RealData, KeyframesAreJpegAndHaveNoImu) {
   EXPECT_EQ(tally.left, 100);
   EXPECT_EQ(tally.imu, 0);
   EXPECT_EQ((*data)->info().ground_truth_poses, 2895);
+}
+
+TEST(DatasetTest, AnImuThatIsTooSlowIsSaid) {
+  const auto said = [](int hz, double declared_hz) {
+    DatasetContents contents;
+    contents.rig.imu_noise.rate_hz = declared_hz;
+    contents.frames.push_back({Time{0}, "a", "b"});
+    for (int i = 0; i < 100; ++i) contents.imu.push_back({Time{i * (1'000'000'000LL / hz)}, Vec3::Zero(), Vec3::Zero()});
+    describe(contents);
+    std::string out;
+    for (const std::string& warning : contents.info.warnings)
+      if (warning.find("readings a second") != std::string::npos) out += warning;
+    return out;
+  };
+  EXPECT_EQ(said(20, 200),
+            "IMU: 20 readings a second where 200 are declared, too few for an estimate (`imu_gap`, `alignment_refused`): set the sensor "
+            "to 100 to 400 Hz");
+  EXPECT_EQ(said(40, 40), "IMU: 40 readings a second, between which the motion is hardly known: set the sensor to 100 to 400 Hz");
+  EXPECT_EQ(said(100, 200), "");
 }
 
 }  // namespace dataset_test

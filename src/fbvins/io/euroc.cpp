@@ -13,6 +13,7 @@
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/euroc_rows.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/numbers.hpp"
@@ -20,7 +21,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargestFolderCsv_bytes = std::uint64_t{1} << 30u;
+constexpr std::uint64_t kLargestTruth_bytes = std::uint64_t{1} << 30u;
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
 
@@ -59,7 +60,8 @@ class EurocReader {
     out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
     find_cameras();
     for (auto step :
-         {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_frames, &EurocReader::read_imu})
+         {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_rows, &EurocReader::read_frames,
+          &EurocReader::read_imu})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
@@ -188,16 +190,22 @@ class EurocReader {
     out_.rig = with_cameras(rig, mounted);
   }
 
+  Result<void> read_rows() {
+    has_imu_ = options_.require_imu || exists("imu0/data.csv");
+    Result<EurocRows> rows = read_euroc_rows(*files_, root_, {folders(), has_depth_ ? std::string(kDepthFolder) : "", has_imu_});
+    if (!rows) return rows.error();
+    rows_ = *std::move(rows);
+    out_.info.clock_steps = rows_.clock.begins;
+    for (std::string& warning : rows_.warnings) warn(std::move(warning));
+    return {};
+  }
+
   Result<void> read_frames() {
-    std::vector<std::vector<ImageRow>> lists(cameras_.size());
+    std::vector<std::vector<ImageRow>> lists;
     DatasetInfo& info = out_.info;
-    for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      CameraInfo& about = i == 0 ? info.left : i == 1 ? info.right : info.more;
-      if (Result<void> read = read_rows(folder_of(cameras_[i]), about, lists[i]); !read) return read;
-    }
-    std::vector<ImageRow> depths;
-    if (has_depth_)
-      if (Result<void> read = read_rows(std::string(kDepthFolder), info.depth, depths); !read) return read;
+    for (std::size_t i = 0; i < cameras_.size(); ++i)
+      lists.push_back(taken(rows_.cameras[i], i == 0 ? info.left : i == 1 ? info.right : info.more));
+    const std::vector<ImageRow> depths = taken(rows_.depth, info.depth);
     out_.frames = join_images(std::move(lists), depths, own_offsets(out_.rig), options_.pair_tolerance_ms, info);
     const auto never = [&](const std::string& folder) {
       return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam{}'s",
@@ -210,17 +218,10 @@ class EurocReader {
     return find_images();
   }
 
-  /// Of the images in a folder.
-  Result<void> read_rows(const std::string& folder, CameraInfo& info, std::vector<ImageRow>& images) {
-    Result<std::string> csv = text(folder + "data.csv", kLargestFolderCsv_bytes);
-    if (!csv) return csv.error();
-    auto rows = read_image_rows(*csv, named(folder + "data.csv"));
-    if (!rows) return rows.error();
-    warn_about_rows(rows->counts, named(folder + "data.csv"));
-    info.rows += rows->counts;
-    info.listed += static_cast<int>(rows->rows.size());
-    images = std::move(rows->rows);
-    return {};
+  static std::vector<ImageRow> taken(StampedRows<ImageRow>& rows, CameraInfo& info) {
+    info.rows += rows.counts;
+    info.listed += static_cast<int>(rows.rows.size());
+    return std::move(rows.rows);
   }
 
   /// Drops names of missing files, and frames of which both files are missing.
@@ -252,14 +253,9 @@ class EurocReader {
   }
 
   Result<void> read_imu() {
-    if (!options_.require_imu && !exists("imu0/data.csv")) return {};
-    Result<std::string> csv = text("imu0/data.csv", kLargestFolderCsv_bytes);
-    if (!csv) return csv.error();
-    auto rows = read_stamped_rows<ImuSample>(*csv, named("imu0/data.csv"), ImuRowParser{});
-    if (!rows) return rows.error();
-    warn_about_rows(rows->counts, named("imu0/data.csv"));
-    out_.info.imu_rows = rows->counts;
-    out_.imu = std::move(rows->rows);
+    if (!has_imu_) return {};
+    out_.info.imu_rows = rows_.imu.counts;
+    out_.imu = std::move(rows_.imu.rows);
     return check_overlap();
   }
 
@@ -285,11 +281,11 @@ class EurocReader {
       if (!mounting) return warn(fmt::format("ground truth is not used: {}", mounting.error().message));
       T_BS = *mounting;
     }
-    Result<std::string> csv = text(folder + "data.csv", kLargestFolderCsv_bytes);
+    Result<std::string> csv = text(folder + "data.csv", kLargestTruth_bytes);
     if (!csv) return warn(fmt::format("ground truth is not used: {}", csv.error().message));
-    Result<TrajectoryFile> truth = parse_trajectory(*csv, named(folder + "data.csv"));
+    Result<TrajectoryFile> truth = parse_truth(*csv, named(folder + "data.csv"), rows_.clock);
     if (!truth) return warn(fmt::format("ground truth is not used: {}", truth.error().message));
-    warn_about_rows(truth->counts, named(folder + "data.csv"));
+    for (std::string& warning : row_warnings(truth->counts, named(folder + "data.csv"))) warn(std::move(warning));
     out_.info.ground_truth_rows = truth->counts;
     out_.info.ground_truth_poses = static_cast<int>(truth->points.size());
     out_.ground_truth = std::move(truth->points);
@@ -311,19 +307,13 @@ class EurocReader {
     if (options_.brings_rig() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
   }
 
-  void warn_about_rows(const RowCounts& c, const std::string& file) {
-    if (c.wraps > 0)
-      warn(fmt::format("{}: a counter of 32 bits of microseconds began again at 0 ({} x): the stamps are continued", file, c.wraps));
-    if (c.bad() > 0)
-      warn(fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}",
-                       file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
-  }
-
   std::unique_ptr<FileSource> files_;
   std::string root_;
   const DatasetOptions& options_;
   std::vector<int> cameras_;  ///< numbers of the folders: of the left camera, the right one, and those that follow
   bool has_depth_ = false;    ///< images of a depth sensor, which are used
+  bool has_imu_ = false;
+  EurocRows rows_;
   Pose<B, B> T_BI_;           ///< takes IMU to the recording's body coordinates
   DatasetContents out_;
 };

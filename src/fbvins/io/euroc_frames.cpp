@@ -169,8 +169,12 @@ PairedFrames pair_without_trigger(const std::vector<ImageRow>& left, const std::
 }  // namespace
 
 Result<StampedRows<ImageRow>> read_image_rows(std::string_view csv, const std::string& file) {
+  return in_order(parse_image_rows(csv, file));
+}
+
+ParsedRows<ImageRow> parse_image_rows(std::string_view csv, const std::string& file) {
   std::vector<std::string_view> fields;
-  return read_stamped_rows<ImageRow>(csv, file, [&](std::string_view line, ImageRow& row, std::string& problem) {
+  return parse_stamped_lines<ImageRow>(data_lines(csv), file, [&](std::string_view line, ImageRow& row, std::string& problem) {
     split_at_commas(line, fields);
     if (fields.size() != 2) {
       problem = fmt::format("{} columns where 2 are needed", fields.size());

@@ -13,6 +13,7 @@ struct ImageRow {
   Time t;
   std::string file;  ///< below camN/data/
 };
+ParsedRows<ImageRow> parse_image_rows(std::string_view csv, const std::string& file);
 Result<StampedRows<ImageRow>> read_image_rows(std::string_view csv, const std::string& file);
 
 /// A row of imu0/data.csv: stamp, gyro xyz, accelerometer xyz.

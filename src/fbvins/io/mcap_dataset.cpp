@@ -49,6 +49,7 @@ class RecordReader {
     drop_half_frame();
     for (auto step : {&RecordReader::check, &RecordReader::read_calibration})
       if (Result<void> done = (this->*step)(); !done) return done.error();
+    continue_stamps(out_, name_);
     join_without_trigger();
     if (Result<void> done = cut(); !done) return done.error();
     warn();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace fbvins {
 namespace {
@@ -20,6 +21,8 @@ constexpr double kShortestMisfit_s = 0.25, kPaceShare = 0.2, kPaceJitter_s = 0.0
 /// Camera and IMU share a clock: two jumps that agree within these are the same one.
 constexpr double kSameJump_s = 0.05, kSameJumpWithin_s = 5;
 constexpr double kWindow_s = 5;
+/// Of a counter of 32 bits of microseconds.
+constexpr Duration kWrap{(std::int64_t{1} << 32u) * 1000};
 /// Two stamps are in step if they are this much apart, at most, from what passed between them.
 constexpr double kInStep_s = 0.1;
 /// A stamp is early if it is less late than any of its stream in the last seconds by more than this, and this many periods: data
@@ -118,7 +121,8 @@ bool ClockGuard::go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const {
 }
 
 /// Puts the stamp a whole number of periods after the stream's newest one, by the time that has passed; or the other stream's
-/// correction, where that has jumped just now by about the same; or the correction of before, where the clock jumped back.
+/// correction, where that has jumped just now by about the same; or a counter's wrap; or the correction of before, where the clock
+/// jumped back.
 Duration ClockGuard::correction_after_jump(Stream stream, Time raw, Time host) const {
   const State &s = states_[stream], &other = states_[1 - stream];
   const double passed_s = (host - *s.newest_host).seconds() * rate_;
@@ -128,6 +132,7 @@ Duration ClockGuard::correction_after_jump(Stream stream, Time raw, Time host) c
   const bool other_jumped = (host - other.jumped_host).seconds() < kSameJumpWithin_s;
   const auto about = [&](Duration d) { return std::abs((own - d).seconds()) < kSameJump_s; };
   if (other_jumped && about(other.correction)) return other.correction;
+  if (const Duration wrapped = s.correction + kWrap; about(wrapped)) return wrapped;
   return about(s.correction_before) ? s.correction_before : own;
 }
 

@@ -240,6 +240,20 @@ TEST(ClockGuard, AJumpTooSmallToBeSeenForwardsIsSeenByBothStreamsBackwards) {
   }
 }
 
+TEST(ClockGuard, ACounterThatWrapsIsContinuedExactly) {
+  ClockGuard guard(1);
+  constexpr std::int64_t kWrap = 4'294'967'296'000;
+  std::optional<ClockGuard::Event> last;
+  std::int64_t true_ns = 0;
+  for (int k = 0; k < 4000; ++k) {
+    true_ns = kWrap - 8'000'000'000 + k * 5'000'000LL;
+    last = guard.correct(ClockGuard::imu, Time{true_ns % kWrap}, at(50.003 + k * 0.005 + 0.002 * std::sin(7.0 * k)));
+  }
+  EXPECT_EQ(guard.jumps(), 1);
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->t.ns, true_ns);
+}
+
 TEST(ClockGuard, SaysWhenAStampWasOnThisMachine) {
   ClockGuard guard(1);
   double worst_s = 0;

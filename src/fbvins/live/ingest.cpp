@@ -93,6 +93,7 @@ void Ingest::take(StereoFrame frame, Time t, Time host) {
     return;
   }
   frame.t = t;
+  after_clock_step_ |= frame.after_clock_step;
   remove_frozen(frame);
   if (newest_image_ && frame.without_images() && t - *newest_image_ < kSameImage) {
     ++counts_.images_late;
@@ -104,6 +105,7 @@ void Ingest::take(StereoFrame frame, Time t, Time host) {
   const std::lock_guard lock(mutex_);
   if (closed_) return;
   if (image_waits_) drop_waiting_image();
+  frame.after_clock_step = std::exchange(after_clock_step_, false);
   queue_.push_back(std::move(frame));
   image_waits_ = true;
   filled_.notify_one();
@@ -171,6 +173,7 @@ void Ingest::release(const ImuSample& sample) {
 void Ingest::drop_waiting_image() {
   const auto waiting = std::find_if(queue_.begin(), queue_.end(),
                                     [](const SensorEvent& event) { return std::holds_alternative<StereoFrame>(event); });
+  after_clock_step_ |= std::get<StereoFrame>(*waiting).after_clock_step;
   queue_.erase(waiting);
   ++images_dropped_;
 }

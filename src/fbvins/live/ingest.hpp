@@ -100,6 +100,7 @@ class Ingest final : public SensorInput {
   std::deque<SensorEvent> queue_;
   std::vector<Anchor> anchors_;
   bool image_waits_ = false, closed_ = false;
+  bool after_clock_step_ = false;  ///< the next image handed on is the first one since; under order_mutex_
   std::int64_t images_dropped_ = 0;
 };
 

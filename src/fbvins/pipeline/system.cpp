@@ -120,6 +120,7 @@ struct System::Impl {
     frame.imu = std::move(packet.imu);
     frame.depth = packet.frame.depth;
     frame.offsets = packet.frame.offsets;
+    frame.after_clock_step = packet.frame.after_clock_step;
     frame.anchors = std::move(packet.anchors);
     if (keyframes_wanted()) frame.images = std::move(images);
     hand_on(estimation, std::move(frame));
@@ -127,7 +128,7 @@ struct System::Impl {
 
   void estimate(TrackedFrame frame) {
     if (on_tracked_frame) on_tracked_frame(lenses.any() ? lenses.gathered(frame) : frame);
-    if (start_again.exchange(false)) estimator.start_again();
+    if (start_again.exchange(false) || frame.after_clock_step) estimator.start_again();
     Estimate estimate = estimator.process(frame);
     std::uint8_t& without_cameras = estimate.odometry.health.without_cameras;
     without_cameras = lenses.lenses_of(without_cameras);
