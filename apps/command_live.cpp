@@ -14,6 +14,7 @@
 #include "apps/live_check.hpp"
 #include "apps/live_outputs.hpp"
 #include "apps/live_summary.hpp"
+#include "apps/open_recording.hpp"
 #include "apps/open_source.hpp"
 #include "apps/ros_graph.hpp"
 #include "apps/run_map.hpp"
@@ -119,7 +120,9 @@ Result<void> write_results(const std::string& folder, const Config& config, cons
 }
 
 Result<std::unique_ptr<Source>> source_of(const Arguments& arguments, const RosGraph& graph) {
-  const SourceOptions options{.dataset = arguments.dataset,
+  const Result<DatasetOptions> dataset = with_calibration(arguments.dataset);
+  if (!dataset) return dataset.error();
+  const SourceOptions options{.dataset = *dataset,
                               .laps = arguments.laps,
                               .preload = arguments.preload,
                               .say = note,
@@ -181,6 +184,7 @@ int run(Arguments arguments) {
   if (!graph) return fail(graph.error().message);
   const auto source = source_of(arguments, *graph);
   if (!source) return fail(source.error().message);
+  if (const auto* replay = dynamic_cast<const ReplaySource*>(source->get())) RecordingWarnings().print(replay->dataset().info());
   if (arguments.check_s > 0) return check_sensors(**source, arguments.check_s);
   const StereoRig& rig = (*source)->rig();
   const auto map =
@@ -216,8 +220,9 @@ void add_live_command(CLI::App& program, int& exit_code) {
   arguments->config.add_to(*command);
   arguments->outputs.add_to(*command);
   command->add_option("--calibration", arguments->dataset.kalibr_camchain,
-                      "Kalibr camchain-imucam.yaml instead of the source's own");
-  command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
+                      "calibration file instead of the source's own, of every kind that `fbvins run` reads");
+  command->add_option("--imu-calibration", arguments->dataset.kalibr_imu,
+                      "the IMU alone, with --calibration: imu.yaml of Kalibr or OpenVINS, or axes in RealSense's JSON");
   command->add_option("--imu-state", arguments->imu_state, kImuStateHelp);
   command->add_option("--max-images", arguments->dataset.max_frames, "replay: end after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);

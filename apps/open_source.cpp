@@ -4,6 +4,7 @@
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/v4l2/v4l2_source.hpp"
 #ifdef FBVINS_WITH_BAGS
+#include "fbvins/bags/calibration.hpp"
 #include "fbvins/bags/recording.hpp"
 #endif
 #ifdef FBVINS_WITH_REALSENSE
@@ -35,11 +36,22 @@ Result<std::unique_ptr<Source>> open_realsense([[maybe_unused]] const std::strin
 Result<std::unique_ptr<Dataset>> open_any(const std::string& path, const DatasetOptions& dataset) {
   RecordingOptions options{.dataset = dataset, .calibration = dataset.kalibr_camchain, .imu_calibration = dataset.kalibr_imu};
   options.dataset.kalibr_camchain = options.dataset.kalibr_imu = "";
+  options.dataset.rig.reset();
   return open_recording(path, options);
 }
 #endif
 
 }  // namespace
+
+Result<DatasetOptions> with_calibration(DatasetOptions options) {
+#ifdef FBVINS_WITH_BAGS
+  if (options.kalibr_camchain.empty() || is_kalibr(options.kalibr_camchain)) return options;
+  const Result<StereoRig> rig = load_calibration(options.kalibr_camchain, options.kalibr_imu);
+  if (!rig) return rig.error();
+  options.rig = *rig;
+#endif
+  return options;
+}
 
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options) {
   const auto colon = name.find(':');

@@ -80,12 +80,18 @@ std::vector<std::string> socket_seeds() {
   depth.minor = 6, depth.cameras = 1, depth.slot_bytes = 12288, depth.depth_offset_bytes = 4096;
   depth.depth = {0.003, 0.2, 8, 0.005};
   depth.depth_width_px = 64, depth.depth_height_px = 48, depth.depth_camera = depth.rig.left;
+  FbvinsSocketHello lenses = hello;
+  lenses.flags |= FBVINS_SOCKET_HAS_LENSES | FBVINS_SOCKET_HAS_IMU_AXES;
+  lenses.minor = 8, lenses.rig.left.model = FBVINS_SOCKET_RADTAN5, lenses.rig.right.model = FBVINS_SOCKET_RATIONAL;
+  lenses.more_distortion[0][0] = 0.01, lenses.more_distortion[1][3] = 0.001;
+  for (const int i : {0, 4, 8}) lenses.imu_axes.gyro[i] = lenses.imu_axes.accel[i] = 1;
   FbvinsSocketImu imu{{}, 3, 0, {}};
   for (int i = 0; i < 3; ++i) imu.readings[i] = {100 + i, {0.1, 0.2, 0.3}, {0, 0, 9.81}};
   return {
       bytes_of(FBVINS_SOCKET_HELLO, hello),
       bytes_of(FBVINS_SOCKET_HELLO, three),
       bytes_of(FBVINS_SOCKET_HELLO, depth),
+      bytes_of(FBVINS_SOCKET_HELLO, lenses),
       bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
       bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT, {}}),
       bytes_of(FBVINS_SOCKET_POSITION, FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),

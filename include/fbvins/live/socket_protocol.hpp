@@ -18,7 +18,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 7,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 8,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -50,7 +50,11 @@ enum {
   FBVINS_SOCKET_RADTAN = 0,
   FBVINS_SOCKET_EQUIDISTANT = 1,
   FBVINS_SOCKET_DOUBLE_SPHERE = 2,
-  FBVINS_SOCKET_EXTENDED_UNIFIED = 3
+  FBVINS_SOCKET_EXTENDED_UNIFIED = 3,
+  // Since version 1.8, with FBVINS_SOCKET_HAS_LENSES:
+  FBVINS_SOCKET_OMNI_RADTAN = 4,
+  FBVINS_SOCKET_RADTAN5 = 5,
+  FBVINS_SOCKET_RATIONAL = 6
 };
 
 typedef struct FbvinsSocketCamera {
@@ -58,7 +62,8 @@ typedef struct FbvinsSocketCamera {
   uint32_t reserved;
   double focal_px[2];    ///< fx, fy
   double centre_px[2];   ///< cx, cy; the centre of the top-left pixel is (0, 0)
-  double distortion[4];  ///< k1 k2 p1 p2 (radtan), k1 k2 k3 k4 (equidistant), xi alpha (ds), alpha beta (eucm)
+  double distortion[4];  ///< k1 k2 p1 p2 (radtan), k1 k2 k3 k4 (equidistant), xi alpha (ds), alpha beta (eucm); the first four
+                         ///< of those that have more
   double T_BC[12];       ///< three rows of four, R | p: p_B = R * p_C + p; B is the IMU
 } FbvinsSocketCamera;
 
@@ -79,6 +84,14 @@ typedef struct FbvinsSocketTimes {
   double line_delay_s;   ///< of a rolling shutter, from row to row; the stamp is the middle row's. 0: a global shutter
 } FbvinsSocketTimes;
 
+/// What the IMU's scale, axes and fixed biases make of what is true (docs/calibration.md): reading = gyro * (angular rate) +
+/// gyro_by_force * (specific force) + gyro_bias, and accel * (specific force) + accel_bias. Matrices row by row.
+typedef struct FbvinsSocketImuAxes {
+  double gyro[9], accel[9];
+  double gyro_by_force[9];  ///< rad/s for each m/s^2
+  double gyro_bias_radps[3], accel_bias_mps2[3];
+} FbvinsSocketImuAxes;
+
 /// A depth sensor (docs/depth.md).
 typedef struct FbvinsSocketDepth {
   double noise_at_1m_m;  ///< standard deviation at a distance of one metre; it grows with the square of the distance
@@ -95,7 +108,9 @@ enum {
   FBVINS_SOCKET_HAS_DEPTH =
       4,  ///< since version 1.3: one camera, with a depth sensor; those from `depth_offset_bytes` on are filled
   FBVINS_SOCKET_HAS_TIMES = 8,         ///< since version 1.4: `times` is filled
-  FBVINS_SOCKET_HAS_DEPTH_CAMERA = 16  ///< since version 1.6: with FBVINS_SOCKET_HAS_DEPTH, those from `depth_width_px` on are
+  FBVINS_SOCKET_HAS_DEPTH_CAMERA = 16,  ///< since version 1.6: with FBVINS_SOCKET_HAS_DEPTH, those from `depth_width_px` on are
+  FBVINS_SOCKET_HAS_LENSES = 32,        ///< since version 1.8: `more_distortion` is filled
+  FBVINS_SOCKET_HAS_IMU_AXES = 64       ///< since version 1.8: `imu_axes` is filled; without it the readings are corrected
 };
 
 /// The first message, with one file descriptor: a memfd of at least slots * slot_bytes, sealed with F_SEAL_SHRINK.
@@ -129,6 +144,12 @@ typedef struct FbvinsSocketHello {
   // left out:
   uint32_t depth_width_px, depth_height_px;
   FbvinsSocketCamera depth_camera;  ///< of the rig: the depth sensor's own lens and pose
+  // Since version 1.8, with FBVINS_SOCKET_HAS_LENSES; else 0 or left out:
+  /// Of cameras 0, 1 ... and, last, of the depth sensor: p2 (omni-radtan, whose first four are xi k1 k2 p1), k3 (radtan with five),
+  /// k3 k4 k5 k6 (rational); both behind k1 k2 p1 p2.
+  double more_distortion[FBVINS_SOCKET_MOST_CAMERAS + 1][4];
+  // Since version 1.8, with FBVINS_SOCKET_HAS_IMU_AXES; else 0 or left out:
+  FbvinsSocketImuAxes imu_axes;
 } FbvinsSocketHello;
 
 typedef struct FbvinsSocketReading {

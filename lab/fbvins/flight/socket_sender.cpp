@@ -64,16 +64,11 @@ Result<void> SocketSender::greet(const StereoRig& rig) {
   FbvinsSocketHello hello{};
   hello.header = {FBVINS_SOCKET_HELLO, sizeof(hello)};
   std::memcpy(hello.magic, FBVINS_SOCKET_MAGIC, sizeof(hello.magic));
-  hello.major = FBVINS_SOCKET_MAJOR, hello.minor = FBVINS_SOCKET_MINOR, hello.flags = FBVINS_SOCKET_HAS_RIG;
+  hello.major = FBVINS_SOCKET_MAJOR, hello.minor = FBVINS_SOCKET_MINOR;
   std::strcpy(hello.name, "simulated vehicle");
   hello.width_px = width_px_, hello.height_px = height_px_;
   hello.slots = kSlots, hello.slot_bytes = 2 * image_bytes, hello.right_offset_bytes = image_bytes;
-  const SocketRig sent = socket_rig(rig);
-  hello.rig = sent.pair;
-  if (sent.times) {
-    hello.flags |= FBVINS_SOCKET_HAS_TIMES;
-    std::copy(sent.times->begin(), sent.times->end(), hello.times);
-  }
+  put_rig(socket_rig(rig), hello);
   iovec place{&hello, sizeof(hello)};
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   msghdr message{};

@@ -5,18 +5,17 @@
 
 #include <utility>
 
-#include "fbvins/io/kalibr.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/socket_source.hpp"
+#include "fbvins/live/source_rig.hpp"
 
 namespace fbvins {
 namespace {
 
 Result<std::unique_ptr<Source>> make_socket_source(const std::string& path, const SourceOptions& options) {
   SocketOptions socket{.say = options.say, .give_up = options.give_up, .group = options.socket_group};
-  if (!options.dataset.kalibr_camchain.empty()) {
-    const std::string& imu = options.dataset.kalibr_imu;
-    const auto rig = load_kalibr(options.dataset.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
+  if (options.dataset.brings_rig()) {
+    const auto rig = given_rig(options.dataset);
     if (!rig) return rig.error();
     socket.rig = *rig;
   } else {

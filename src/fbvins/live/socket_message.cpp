@@ -18,11 +18,13 @@ constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
 constexpr auto kLargestSide_px = static_cast<std::uint32_t>(kLargestImageSide_px);
 
-/// What the messages had in versions 1.1, 1.2, 1.3 and 1.4.
+/// What the messages had in versions 1.1, 1.2, 1.3, 1.4 and 1.6, and with lenses.
 constexpr std::size_t kFirstHello_bytes = offsetof(FbvinsSocketHello, cameras);
 constexpr std::size_t kSecondHello_bytes = offsetof(FbvinsSocketHello, depth_offset_bytes);
 constexpr std::size_t kThirdHello_bytes = offsetof(FbvinsSocketHello, times);
 constexpr std::size_t kFourthHello_bytes = offsetof(FbvinsSocketHello, depth_width_px);
+constexpr std::size_t kFifthHello_bytes = offsetof(FbvinsSocketHello, more_distortion);
+constexpr std::size_t kSixthHello_bytes = offsetof(FbvinsSocketHello, imu_axes);
 constexpr std::size_t kFirstFrame_bytes = offsetof(FbvinsSocketFrame, offset_ns);
 /// Images of one frame lie closer together than this.
 constexpr std::int64_t kLongestOffset_ns = 1'000'000'000;
@@ -31,7 +33,9 @@ static_assert(kFirstHello_bytes == 80 + sizeof(FbvinsSocketRig) && sizeof(Fbvins
 static_assert(kSecondHello_bytes == kFirstHello_bytes + 32 + 6 * sizeof(FbvinsSocketCamera));
 static_assert(kThirdHello_bytes == kSecondHello_bytes + 8 + sizeof(FbvinsSocketDepth) && sizeof(FbvinsSocketDepth) == 32);
 static_assert(kFourthHello_bytes == kThirdHello_bytes + 8 * sizeof(FbvinsSocketTimes) && sizeof(FbvinsSocketTimes) == 16);
-static_assert(sizeof(FbvinsSocketHello) == kFourthHello_bytes + 8 + sizeof(FbvinsSocketCamera));
+static_assert(kFifthHello_bytes == kFourthHello_bytes + 8 + sizeof(FbvinsSocketCamera));
+static_assert(kSixthHello_bytes == kFifthHello_bytes + 9 * 32 && sizeof(FbvinsSocketImuAxes) == 264);
+static_assert(sizeof(FbvinsSocketHello) == kSixthHello_bytes + sizeof(FbvinsSocketImuAxes));
 static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
@@ -110,7 +114,9 @@ Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
 
 /// Up to the last field that is filled.
 std::size_t size_of_hello(std::uint32_t flags) {
-  if ((flags & FBVINS_SOCKET_HAS_DEPTH_CAMERA) != 0) return sizeof(FbvinsSocketHello);
+  if ((flags & FBVINS_SOCKET_HAS_IMU_AXES) != 0) return sizeof(FbvinsSocketHello);
+  if ((flags & FBVINS_SOCKET_HAS_LENSES) != 0) return kSixthHello_bytes;
+  if ((flags & FBVINS_SOCKET_HAS_DEPTH_CAMERA) != 0) return kFifthHello_bytes;
   if ((flags & FBVINS_SOCKET_HAS_TIMES) != 0) return kFourthHello_bytes;
   if ((flags & FBVINS_SOCKET_HAS_DEPTH) != 0) return kThirdHello_bytes;
   return (flags & FBVINS_SOCKET_HAS_CAMERAS) != 0 ? kSecondHello_bytes : kFirstHello_bytes;
@@ -144,6 +150,11 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
     }
   }
   if ((hello->flags & FBVINS_SOCKET_HAS_TIMES) != 0) out.rig->times = std::to_array(hello->times);
+  if ((hello->flags & FBVINS_SOCKET_HAS_LENSES) != 0) {
+    auto& lenses = out.rig->lenses.emplace();
+    for (std::size_t i = 0; i < lenses.size(); ++i) lenses[i] = std::to_array(hello->more_distortion[i]);
+  }
+  if ((hello->flags & FBVINS_SOCKET_HAS_IMU_AXES) != 0) out.rig->axes = hello->imu_axes;
   const auto rig = parse_socket_rig(*out.rig, layout->width_px, layout->height_px);
   if (!rig) return rig.error();
   return SocketMessage(std::move(out));

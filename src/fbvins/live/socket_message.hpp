@@ -52,6 +52,9 @@ struct SocketRig {
   FbvinsSocketCamera depth_camera{};                                      ///< of a depth sensor that lies elsewhere
   int depth_width_px = 0, depth_height_px = 0;                            ///< of its images; 0: they are registered to the camera
   std::optional<std::array<FbvinsSocketTimes, kMostCameras>> times = {};  ///< none: all cameras have those of `pair`
+  /// Coefficients of lenses that have more than four, of cameras 0, 1 ... and, last, of the depth sensor; none: no lens has.
+  std::optional<std::array<std::array<double, 4>, kMostCameras + 1>> lenses = {};
+  std::optional<FbvinsSocketImuAxes> axes = {};
 };
 bool same(const SocketRig& a, const SocketRig& b);
 
@@ -102,5 +105,7 @@ Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);
 Result<StereoRig> parse_socket_rig(const SocketRig& rig, int width_px, int height_px);
 /// The reverse, for our own senders and for tests.
 SocketRig socket_rig(const StereoRig& rig);
+/// The calibration's fields and flags of a hello.
+void put_rig(const SocketRig& rig, FbvinsSocketHello& hello);
 
 }  // namespace fbvins

@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
@@ -25,23 +29,54 @@ bool are_finite(const double* begin, std::size_t count) {
   return std::all_of(begin, begin + count, [](double x) { return std::isfinite(x); });
 }
 
-Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_px, const std::string& side) {
+struct Lens {
+  std::uint32_t model;
+  const char* name;  ///< as Camera::model_name() has it
+  std::size_t coefficients;
+};
+/// In the order of LensModel.
+constexpr Lens kLenses[] = {{FBVINS_SOCKET_RADTAN, "pinhole-radtan", 4},     {FBVINS_SOCKET_EQUIDISTANT, "pinhole-equidistant", 4},
+                            {FBVINS_SOCKET_DOUBLE_SPHERE, "ds", 2},          {FBVINS_SOCKET_EXTENDED_UNIFIED, "eucm", 2},
+                            {FBVINS_SOCKET_OMNI_RADTAN, "omni-radtan", 5},   {FBVINS_SOCKET_RADTAN5, "pinhole-radtan5", 5},
+                            {FBVINS_SOCKET_RATIONAL, "pinhole-rational", 8}};
+static_assert(std::size(kLenses) == std::variant_size_v<LensModel>);
+
+/// `number`: the camera's among those of SocketRig::lenses.
+Result<Camera> camera_of(const SocketRig& sent, const FbvinsSocketCamera& c, std::size_t number, int width_px, int height_px,
+                         const std::string& side) {
   const double* f = c.focal_px;
   const double* m = c.centre_px;
-  const double* k = c.distortion;
-  if (!are_finite(f, 2) || !are_finite(m, 2) || !are_finite(k, 4) || !(f[0] > 0 && f[1] > 0))
+  const auto lens = std::ranges::find(kLenses, c.model, &Lens::model);
+  if (lens == std::end(kLenses)) return wrong_rig(fmt::format("the {} camera has no model {}", side, c.model));
+  if (lens->coefficients > 4 && !sent.lenses)
+    return wrong_rig(fmt::format("the {} camera's model {} has {} coefficients, which come in more_distortion, since version 1.8",
+                                 side, lens->name, lens->coefficients));
+  std::vector<double> k(c.distortion, c.distortion + 4);
+  if (sent.lenses) k.insert(k.end(), (*sent.lenses)[number].begin(), (*sent.lenses)[number].end());
+  k.resize(std::max(lens->coefficients, std::size_t{4}));
+  if (!are_finite(f, 2) || !are_finite(m, 2) || !are_finite(k.data(), k.size()) || !(f[0] > 0 && f[1] > 0))
     return wrong_rig(fmt::format("the {} camera's intrinsics are not finite, with positive focal lengths", side));
-  if (c.model == FBVINS_SOCKET_RADTAN)
-    return Camera(PinholeRadtan{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
-  if (c.model == FBVINS_SOCKET_EQUIDISTANT)
-    return Camera(KannalaBrandt{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
-  const bool double_sphere = c.model == FBVINS_SOCKET_DOUBLE_SPHERE;
-  if (!double_sphere && c.model != FBVINS_SOCKET_EXTENDED_UNIFIED)
-    return wrong_rig(fmt::format("the {} camera has no model {}", side, c.model));
-  if (const std::string problem = outside_of_model(double_sphere ? "ds" : "eucm", {k[0], k[1]}); !problem.empty())
+  k.resize(lens->coefficients);
+  if (const std::string problem = outside_of_model(lens->name, k); !problem.empty())
     return wrong_rig(fmt::format("of the {} camera {}", side, problem));
-  if (double_sphere) return Camera(DoubleSphere{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
-  return Camera(ExtendedUnified{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
+  return Camera(*lens_of(lens->name, {f[0], f[1], m[0], m[1]}, k), width_px, height_px);
+}
+
+Mat3 matrix_of(const double (&m)[9]) { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m); }
+
+ImuIntrinsics axes_of(const FbvinsSocketImuAxes& sent) {
+  return {matrix_of(sent.gyro), matrix_of(sent.accel), matrix_of(sent.gyro_by_force),
+          {.gyro_radps = Vec3(sent.gyro_bias_radps), .accel_mps2 = Vec3(sent.accel_bias_mps2)}};
+}
+
+FbvinsSocketImuAxes axes_message(const ImuIntrinsics& axes) {
+  FbvinsSocketImuAxes out{};
+  using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const auto put = [](const Mat3& from, double (&to)[9]) { Eigen::Map<Rows>{to} = from; };
+  put(axes.gyro, out.gyro), put(axes.accel, out.accel), put(axes.gyro_by_force, out.gyro_by_force);
+  Eigen::Map<Vec3>{out.gyro_bias_radps} = axes.bias.gyro_radps;
+  Eigen::Map<Vec3>{out.accel_bias_mps2} = axes.bias.accel_mps2;
+  return out;
 }
 
 Result<Pose<B, C0>> mounting_of(const FbvinsSocketCamera& camera, const std::string& side) {
@@ -78,17 +113,14 @@ Result<std::vector<CameraTimes>> times_of(const SocketRig& sent) {
   return out;
 }
 
-FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mounting) {
+/// Its coefficients from the fifth on go to `more`.
+FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mounting, std::array<double, 4>& more) {
   FbvinsSocketCamera out{};
-  // In the order of LensModel.
-  constexpr std::uint32_t kModels[] = {FBVINS_SOCKET_RADTAN, FBVINS_SOCKET_EQUIDISTANT, FBVINS_SOCKET_DOUBLE_SPHERE,
-                                       FBVINS_SOCKET_EXTENDED_UNIFIED};
   const std::array<double, 4> f = camera.intrinsics();
   const std::vector<double> k = camera.distortion();
-  assert(camera.model().index() < std::size(kModels) && k.size() <= std::size(out.distortion));
-  out.model = kModels[camera.model().index()];
+  out.model = kLenses[camera.model().index()].model;
   out.focal_px[0] = f[0], out.focal_px[1] = f[1], out.centre_px[0] = f[2], out.centre_px[1] = f[3];
-  std::copy(k.begin(), k.end(), out.distortion);
+  for (std::size_t i = 0; i < k.size(); ++i) (i < 4 ? out.distortion[i] : more[i - 4]) = k[i];
   Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> T_BC(out.T_BC);
   T_BC.leftCols<3>() = mounting.q.toRotationMatrix();
   T_BC.col(3) = mounting.p;
@@ -98,12 +130,11 @@ FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mount
 }  // namespace
 
 bool same(const SocketRig& a, const SocketRig& b) {
-  return a.cameras == b.cameras && std::memcmp(&a.pair, &b.pair, sizeof(a.pair)) == 0 &&
-         std::memcmp(a.more.data(), b.more.data(), sizeof(a.more)) == 0 && a.depth.has_value() == b.depth.has_value() &&
-         (!a.depth || std::memcmp(&*a.depth, &*b.depth, sizeof(*a.depth)) == 0) && a.depth_width_px == b.depth_width_px &&
-         a.depth_height_px == b.depth_height_px && std::memcmp(&a.depth_camera, &b.depth_camera, sizeof(a.depth_camera)) == 0 &&
-         a.times.has_value() == b.times.has_value() &&
-         (!a.times || std::memcmp(a.times->data(), b.times->data(), sizeof(*a.times)) == 0);
+  const auto alike = [](const auto& x, const auto& y) { return std::memcmp(&x, &y, sizeof(x)) == 0; };
+  const auto both = [&](const auto& x, const auto& y) { return x.has_value() == y.has_value() && (!x || alike(*x, *y)); };
+  return a.cameras == b.cameras && alike(a.pair, b.pair) && alike(a.more, b.more) && both(a.depth, b.depth) &&
+         a.depth_width_px == b.depth_width_px && a.depth_height_px == b.depth_height_px && alike(a.depth_camera, b.depth_camera) &&
+         both(a.times, b.times) && both(a.lenses, b.lenses) && both(a.axes, b.axes);
 }
 
 Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int height_px) {
@@ -112,15 +143,16 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
   for (int i = 0; i < sent.cameras; ++i) {
     const FbvinsSocketCamera& camera = i == 0 ? rig.left : i == 1 ? rig.right : sent.more[static_cast<std::size_t>(i - 2)];
     const std::string side = i == 0 ? "left" : i == 1 ? "right" : fmt::format("number {}", i);
-    const auto lens = camera_of(camera, width_px, height_px, side);
+    const auto lens = camera_of(sent, camera, static_cast<std::size_t>(i), width_px, height_px, side);
     if (!lens) return lens.error();
     const auto T_BC = mounting_of(camera, side);
     if (!T_BC) return T_BC.error();
     cameras.push_back({*lens, *T_BC});
   }
   if (Result<void> good = check_figures(rig); !good) return good.error();
-  const ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
+  ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
                        rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
+  if (sent.axes) noise.axes = axes_of(*sent.axes);
   const auto times = times_of(sent);
   if (!times) return times.error();
   StereoRig out = with_times(with_cameras({}, cameras), *times);
@@ -129,7 +161,7 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
   if (const auto& d = sent.depth) {
     DepthSensor sensor{d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma};
     if (sent.depth_width_px > 0) {
-      const auto lens = camera_of(sent.depth_camera, sent.depth_width_px, sent.depth_height_px, "depth");
+      const auto lens = camera_of(sent, sent.depth_camera, kMostCameras, sent.depth_width_px, sent.depth_height_px, "depth");
       if (!lens) return lens.error();
       const auto T_BC = mounting_of(sent.depth_camera, "depth");
       if (!T_BC) return T_BC.error();
@@ -142,7 +174,10 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
 }
 
 SocketRig socket_rig(const StereoRig& rig) {
-  const auto message = [&](int camera) { return camera_message(rig.camera(camera), rig.T_BC(camera)); };
+  std::array<std::array<double, 4>, kMostCameras + 1> lenses{};
+  const auto message = [&](int camera) {
+    return camera_message(rig.camera(camera), rig.T_BC(camera), lenses[static_cast<std::size_t>(camera)]);
+  };
   SocketRig out{{message(0), rig.has_right() ? message(1) : FbvinsSocketCamera{}, rig.imu_noise.gyro_noise_density_radps_rthz,
                  rig.imu_noise.gyro_random_walk_radps2_rthz, rig.imu_noise.accel_noise_density_mps2_rthz,
                  rig.imu_noise.accel_random_walk_mps3_rthz, rig.imu_noise.rate_hz, rig.image_rate_hz, rig.time_offset_s},
@@ -156,10 +191,44 @@ SocketRig socket_rig(const StereoRig& rig) {
   if (const auto& d = rig.depth) out.depth = FbvinsSocketDepth{d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma};
   if (rig.depth && rig.depth->own) {
     const auto& [camera, T_BC] = *rig.depth->own;
-    out.depth_camera = camera_message(camera, T_BC);
+    out.depth_camera = camera_message(camera, T_BC, lenses.back());
     out.depth_width_px = camera.width(), out.depth_height_px = camera.height();
   }
+  const auto has_more = [](const Camera& camera) { return camera.distortion().size() > 4; };
+  bool more = rig.depth && rig.depth->own && has_more(rig.depth->own->camera);
+  for (int i = 0; i < rig.camera_count(); ++i) more |= has_more(rig.camera(i));
+  if (more) out.lenses = lenses;
+  if (rig.imu_noise.axes != ImuIntrinsics{}) out.axes = axes_message(rig.imu_noise.axes);
   return out;
+}
+
+void put_rig(const SocketRig& rig, FbvinsSocketHello& hello) {
+  hello.flags |= FBVINS_SOCKET_HAS_RIG;
+  hello.rig = rig.pair;
+  if (rig.times) {
+    hello.flags |= FBVINS_SOCKET_HAS_TIMES;
+    std::ranges::copy(*rig.times, hello.times);
+  }
+  if (rig.lenses) {
+    hello.flags |= FBVINS_SOCKET_HAS_LENSES;
+    for (std::size_t i = 0; i < rig.lenses->size(); ++i) std::ranges::copy((*rig.lenses)[i], hello.more_distortion[i]);
+  }
+  if (rig.axes) {
+    hello.flags |= FBVINS_SOCKET_HAS_IMU_AXES;
+    hello.imu_axes = *rig.axes;
+  }
+  if (rig.cameras == 2) return;
+  hello.flags |= FBVINS_SOCKET_HAS_CAMERAS;
+  hello.cameras = static_cast<std::uint32_t>(rig.cameras);
+  std::ranges::copy(rig.more, hello.more);
+  if (!rig.depth) return;
+  hello.flags |= FBVINS_SOCKET_HAS_DEPTH;
+  hello.depth = *rig.depth;
+  if (rig.depth_width_px == 0) return;
+  hello.flags |= FBVINS_SOCKET_HAS_DEPTH_CAMERA;
+  hello.depth_camera = rig.depth_camera;
+  hello.depth_width_px = static_cast<std::uint32_t>(rig.depth_width_px);
+  hello.depth_height_px = static_cast<std::uint32_t>(rig.depth_height_px);
 }
 
 }  // namespace fbvins

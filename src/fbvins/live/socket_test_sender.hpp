@@ -47,25 +47,7 @@ inline FbvinsSocketHello hello_message(const StereoRig* rig) {
   hello.slot_bytes = kSlotBytes;
   hello.right_offset_bytes = kSlotBytes / 2;
   if (!rig) return hello;
-  const SocketRig sent = socket_rig(*rig);
-  hello.flags = FBVINS_SOCKET_HAS_RIG;
-  hello.rig = sent.pair;
-  if (sent.times) {
-    hello.flags |= FBVINS_SOCKET_HAS_TIMES;
-    std::copy(sent.times->begin(), sent.times->end(), hello.times);
-  }
-  if (sent.cameras == 2) return hello;
-  hello.flags |= FBVINS_SOCKET_HAS_CAMERAS;
-  hello.cameras = static_cast<std::uint32_t>(sent.cameras);
-  std::copy(sent.more.begin(), sent.more.end(), hello.more);
-  if (!sent.depth) return hello;
-  hello.flags |= FBVINS_SOCKET_HAS_DEPTH;
-  hello.depth = *sent.depth;
-  if (sent.depth_width_px == 0) return hello;
-  hello.flags |= FBVINS_SOCKET_HAS_DEPTH_CAMERA;
-  hello.depth_camera = sent.depth_camera;
-  hello.depth_width_px = static_cast<std::uint32_t>(sent.depth_width_px);
-  hello.depth_height_px = static_cast<std::uint32_t>(sent.depth_height_px);
+  put_rig(socket_rig(*rig), hello);
   return hello;
 }
 

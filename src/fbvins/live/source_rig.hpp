@@ -10,7 +10,10 @@
 
 namespace fbvins {
 
-/// Of the Kalibr files in the options; without one `options.uncalibrated`, with as many cameras. An error where there is neither,
+/// The calibration that the options bring (DatasetOptions::brings_rig): the rig, or that of Kalibr's files.
+Result<StereoRig> given_rig(const DatasetOptions& dataset);
+
+/// Of the calibration in the options; without one `options.uncalibrated`, with as many cameras. An error where there is neither,
 /// or the calibration has another number of cameras; 0 cameras: any number. `what` names the sensors in sentences.
 Result<StereoRig> rig_for_source(const SourceOptions& options, std::string_view what, int cameras);
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "fbvins/camera/camera_times.hpp"
-#include "fbvins/io/kalibr.hpp"
 #include "fbvins/live/host_clock.hpp"
+#include "fbvins/live/source_rig.hpp"
 
 namespace fbvins {
 namespace {
@@ -137,10 +137,8 @@ Result<void> RealsenseSource::wait_for_first() {
 
 Result<void> RealsenseSource::set_rig() {
   const DatasetOptions& files = options_.dataset;
-  const bool own = files.kalibr_camchain.empty();
-  const auto rig =
-      own ? camera_->rig()
-          : load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
+  const bool own = !files.brings_rig();
+  const auto rig = own ? camera_->rig() : given_rig(files);
   if (!rig) return rig.error();
   rig_ = *rig;
   if (mode_.depth && !own) {  // of the files the left camera; what they do not know is the device's
