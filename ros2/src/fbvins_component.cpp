@@ -78,8 +78,10 @@ std::shared_ptr<const fbvins::Image> image_of(const sensor_msgs::msg::Image::Con
 /// Frames; an empty base_frame: there is no vehicle, and the odometry is that of the IMU.
 struct Names {
   explicit Names(const fbvins::Ros2Options& options)
-      : odometry(options.odometry_frame), imu(options.imu_frame), base(options.base_frame.empty() ? imu : options.base_frame) {}
+      : odometry(options.odometry_frame), imu(options.imu_frame), base(options.base_frame.empty() ? imu : options.base_frame),
+        publish_tf(options.publish_tf) {}
   std::string odometry, imu, base;
+  bool publish_tf;
 };
 
 geometry_msgs::msg::TransformStamped transform_of(const std::string& parent, const std::string& child, const fbvins::Vec3& p,
@@ -154,13 +156,18 @@ class Output final : public fbvins::Sink {
   void publish(const fbvins::LivePose& pose) {
     if (!pose.health.has_pose()) return;
     const fbvins::MotionAt<fbvins::BaseLink> at = fbvins::motion_at(T_B_base_, pose);
-    if (!told_ || pose.t < *told_ || pose.t - *told_ >= kTransformPeriod) {
+    if (names_.publish_tf && (!told_ || pose.t < *told_ || pose.t - *told_ >= kTransformPeriod)) {
       told_ = pose.t;
       tf2_msgs::msg::TFMessage message;
       message.transforms.push_back(transform_of(names_.odometry, names_.base, at.T_WX.p, at.T_WX.q, pose.t));
       transforms_->publish(message);
     }
-    odometry_->publish(message_of(at, pose.t, names_));
+    nav_msgs::msg::Odometry message = message_of(at, pose.t, names_);
+    if (told_resets_ && *told_resets_ != pose.reset_counter)  // as RTAB-Map takes it, and filters: no information
+      for (auto* covariance : {&message.pose.covariance, &message.twist.covariance})
+        put(*covariance, fbvins::Mat6(9999 * fbvins::Mat6::Identity()));
+    told_resets_ = pose.reset_counter;
+    odometry_->publish(message);
   }
 
   void publish(const fbvins::LiveStatus& status) {
@@ -185,6 +192,7 @@ class Output final : public fbvins::Sink {
   Names names_;
   fbvins::Pose<fbvins::B, fbvins::BaseLink> T_B_base_;
   std::optional<Time> told_;
+  std::optional<std::uint32_t> told_resets_;
   rclcpp::Publisher<nav_msgs::msg::Odometry>::SharedPtr odometry_;
   rclcpp::Publisher<tf2_msgs::msg::TFMessage>::SharedPtr transforms_, fixed_;
   rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;

@@ -24,6 +24,7 @@ struct Ros2Options {
   std::string imu_frame = "imu_link";
   Ros2Clock clock = Ros2Clock::sensors;
   Ros2Distribution distribution = Ros2Distribution::environment;
+  bool publish_tf = true;
   bool commands = true;
   std::string qos = {};
 
@@ -38,6 +39,8 @@ struct Ros2Options {
     v("clock", clock, "sensors|ros", "whose clock stamps are on; ros: CLOCK_REALTIME of this machine");
     v("distribution", distribution, "environment|iron|humble",
       "ROS's distribution whose tools show the node; iron: that and all later ones; environment: as ROS_DISTRO says");
+    v("publish_tf", publish_tf, "",
+      "false where another node, such as a filter, publishes the transform from the odometry's frame to the vehicle's");
     v("commands", commands, "",
       "whether all in the domain may reset the estimator, save and load the map, and record, by services");
     v("qos", qos, "",

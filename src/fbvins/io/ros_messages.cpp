@@ -124,10 +124,11 @@ void append_odometry(std::string& out, const RosOdometry& o) {
   const Mat3 R_WB = o.T_WB.R();
   Mat6 to_W = Mat6::Identity();
   to_W.bottomRightCorner<3, 3>() = R_WB;
-  const RowMajor6 pose_covariance = to_W * o.pose_covariance * to_W.transpose();
+  RowMajor6 pose_covariance = to_W * o.pose_covariance * to_W.transpose();
   RowMajor6 twist_covariance = RowMajor6::Zero();
   twist_covariance.topLeftCorner<3, 3>() = R_WB.transpose() * o.velocity_covariance * R_WB;
   twist_covariance.bottomRightCorner<3, 3>() = o.rate_covariance;
+  if (o.after_reset) pose_covariance = twist_covariance = kAfterReset * RowMajor6::Identity();
   CdrWriter cdr(out);
   put_header(cdr, o.t, o.frame);
   cdr.text(o.child_frame);

@@ -55,7 +55,10 @@ struct RosOdometry {
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB
   Mat3 rate_covariance = Mat3::Zero();      ///< of w_WB_B
   std::string_view frame = kOdometryFrame, child_frame = kBodyFrame;
+  bool after_reset = false;  ///< covariances are kAfterReset on the diagonal instead
 };
+/// What RTAB-Map takes for an odometry that began anew, and every filter for no information.
+inline constexpr double kAfterReset = 9999;
 void append_odometry(std::string& out, const RosOdometry& odometry);
 
 /// geometry_msgs/PoseStamped.

@@ -117,11 +117,13 @@ Result<void> Ros2Sink::take(const LivePose& pose) {
   const Time t = stamps_.of(pose.t);
   const MotionAt<BaseLink> at = motion_at(T_B_base_, pose);
   const Mat3 R_base_B = T_B_base_.R().transpose();
+  const bool after_reset = told_resets_ && *told_resets_ != pose.reset_counter;
+  told_resets_ = pose.reset_counter;
   std::string message;
   append_odometry(message, {t, at.T_WX.cast_frames<W, B>(), at.v_WX, at.w_WX_X, at.pose_covariance, at.velocity_covariance,
-                            R_base_B * rate_covariance_ * R_base_B.transpose(), options_.odometry_frame, base_frame()});
+                            R_base_B * rate_covariance_ * R_base_B.transpose(), options_.odometry_frame, base_frame(), after_reset});
   if (Result<void> sent = odometry_.publish(std::move(message)); !sent) return sent;
-  if (!due(transformed_, t, kTransformPeriod)) return {};
+  if (!options_.publish_tf || !due(transformed_, t, kTransformPeriod)) return {};
   const bool in_map = map_ && map_->reset_counter == pose.reset_counter;
   const Pose<M, W> T_MW = in_map ? map_->T_MW : Pose<M, W>{};
   const std::array transforms = {RosTransform{options_.odometry_frame, base_frame(), at.T_WX.q, at.T_WX.p},

@@ -5,6 +5,9 @@
 
 #include <array>
 #include <ctime>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "fbvins/io/ros_messages.hpp"
 #include "fbvins/live/socket_test_sender.hpp"
@@ -54,6 +57,32 @@ TEST(Ros2Sink, AnOdometryMessageForEveryPoseAndTransformsFiftyTimesASecond) {
                                RosTransform{"map", "odom", Quat::Identity(), Vec3(0, 0, 7)}};
   append_transforms(with_map, pose_at(1020).t, expected);
   EXPECT_EQ(transforms.messages().back(), with_map);
+}
+
+TEST(Ros2Sink, TheFirstMessageAfterAResetHasNoInformation) {
+  Heard odometry, transforms;
+  const auto on_odometry = Ros2Subscriber::create(node(), "/fbvins/odometry", "nav_msgs/msg/Odometry", 2000, odometry.function());
+  const auto on_transforms = Ros2Subscriber::create(node(), "/tf", "tf2_msgs/msg/TFMessage", 2000, transforms.function());
+  LiveOptions options;
+  options.ros2.publish_tf = false;
+  auto sink = Ros2Sink::create(node(), {}, options);
+  ASSERT_TRUE(sink) << sink.error().message;
+  for (int ms = 100; ms <= 500; ms += 100) {
+    LivePose pose = pose_at(ms);
+    pose.pose_covariance = 0.25 * Mat6::Identity();
+    pose.reset_counter = ms < 300 ? 4 : 5;
+    ASSERT_TRUE((*sink)->take(LiveEvent(pose)));
+  }
+  ASSERT_TRUE(odometry.wait_for(5));
+  const double nothing_known = 9999;
+  const std::string_view bytes(reinterpret_cast<const char*>(&nothing_known), sizeof(nothing_known));
+  std::vector<int> times;
+  for (const std::string& message : odometry.messages()) {
+    times.push_back(0);
+    for (std::size_t at = message.find(bytes); at != message.npos; at = message.find(bytes, at + bytes.size())) ++times.back();
+  }
+  EXPECT_EQ(times, (std::vector<int>{0, 0, 12, 0, 0})) << "of pose and twist, to the last bit";
+  EXPECT_TRUE(transforms.messages().empty());
 }
 
 TEST(Ros2Sink, ThePathIsThinnedAndBeginsAnewWithTheOdometry) {
