@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include "apps/progress.hpp"
 #include "apps/run_flight.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/io/no_pose.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -49,7 +51,18 @@ Result<std::string> make_folder(const Arguments& arguments, const Config& config
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
+  if (std::filesystem::exists(folder + "/summary.json", error))
+    note(fmt::format("{}: holds the results of an earlier run, which are overwritten", folder));
   return folder;
+}
+
+/// For the same recording with the same calibration.
+std::string doctor_command(const RecordingArguments& recording) {
+  std::string out = "fbvins doctor " + recording.path;
+  if (!recording.calibration.empty()) out += " --calibration " + recording.calibration;
+  if (!recording.imu_calibration.empty()) out += " --imu-calibration " + recording.imu_calibration;
+  if (!recording.topics.empty()) out += fmt::format(" --topics {}", fmt::join(recording.topics, ","));
+  return out;
 }
 
 int run(const Arguments& arguments) {
@@ -77,7 +90,8 @@ int run(const Arguments& arguments) {
   if (flight->map && !flight->map->not_saved.empty()) return fail(flight->map->not_saved);
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));
   if (summary.coverage.with_pose > 0) return kOk;
-  warn("no pose could be estimated; the health column of trajectory.csv says why");
+  warn(fmt::format("{}; `{}` examines the recording", no_pose_sentence({summary.health.begin(), summary.health.end()}),
+                   doctor_command(arguments.recording)));
   return kEstimationFailed;
 }
 

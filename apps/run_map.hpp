@@ -60,6 +60,7 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
 
 /// Counts, times, and errors of the trajectories where there is ground truth.
 struct MapSummary {
+  std::string loaded = {};  ///< the file of the map that was there before the flight; empty: none
   int keyframes = 0, keyframes_in_map = 0, loops = 0, refused = 0, left_out = 0;
   int anchors = 0, anchors_refused = 0, anchors_left_out = 0;
   std::optional<double> anchored_after_s;   ///< from the first pose to the first known T_MW of an anchored map

@@ -9,6 +9,7 @@
 
 #include "apps/terminal.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/io/no_pose.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -29,6 +30,10 @@ void count_health(const RunRecord& record, RunSummary& summary) {
 }
 
 void evaluate_against(Trajectory<W> truth, const RunRecord& record, RunSummary& summary) {
+  if (summary.coverage.with_pose == 0) {
+    summary.no_evaluation = no_pose_sentence({summary.health.begin(), summary.health.end()});
+    return;
+  }
   auto evaluation = evaluate(truth, record.poses(), {});
   if (evaluation) summary.evaluation = *evaluation;
   else summary.no_evaluation = evaluation.error().message;
@@ -64,6 +69,7 @@ Json adjustment_json(const FinalAdjustmentReport& a) {
 
 Json map_json(const MapSummary& m) {
   Json json{{"keyframes", m.keyframes}, {"keyframes_in_map", m.keyframes_in_map}, {"loops", m.loops}};
+  if (!m.loaded.empty()) json["found_in_loaded_map"] = m.localised_after_s.has_value();
   json["refused"] = m.refused;
   json["left_out"] = m.left_out;
   if (m.anchored_after_s || m.anchors_refused > 0)
@@ -84,7 +90,10 @@ Json map_json(const MapSummary& m) {
 std::string map_text(const MapSummary& m) {
   std::string text = fmt::format("map: {} keyframes of {}, {} loops, {} refused by the odometry, {} left out by the graph\n",
                                  m.keyframes_in_map, m.keyframes, m.loops, m.refused, m.left_out);
-  if (!m.localised_after_s) text += "map: never localised\n";
+  if (!m.loaded.empty())
+    text += m.localised_after_s ? fmt::format("map: the flight was found in {} {:.1f} s after its first pose\n", m.loaded, *m.localised_after_s)
+                                : fmt::format("map: the flight was never found in {}: its poses in M are not known\n", m.loaded);
+  else if (!m.localised_after_s) text += "map: never localised\n";
   for (const MapSummary::Found& f : m.found_again)
     text += fmt::format("map: found again {:.1f} s after the restart at {:.1f} s\n", f.after_s, f.restart_s);
   for (const auto& [session, why] : m.not_joined) text += fmt::format("map: session {} is no part of it: {}\n", session, why);

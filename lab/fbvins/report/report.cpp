@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "fbvins/core/atomic_file.hpp"
+#include "fbvins/io/no_pose.hpp"
 #include "fbvins/page/curves.hpp"
 #include "fbvins/page/page.hpp"
 #include "fbvins/report/flight_curves.hpp"
@@ -192,6 +195,14 @@ Result<std::vector<std::string>> write_report(const std::vector<std::string>& fo
   for (const std::string& path : folders) {
     Result<RunFolder> run = read_run_folder(path, truth);
     if (!run) return run.error();
+    std::map<std::string, int> health;
+    bool has_pose = false;
+    for (const Odometry& o : run->odometry) {
+      ++health[fmt::format("{}/{}", to_string(o.health.state), to_string(o.health.reason))];
+      has_pose |= o.health.has_pose();
+    }
+    if (!has_pose) warnings.push_back(fmt::format("{}: {}; `fbvins doctor` examines the recording", path, no_pose_sentence(health)));
+    if (!run->truth_recognised.empty()) warnings.push_back(fmt::format("{}: {}", truth.empty() ? path : truth, run->truth_recognised));
     if (run->truth.empty()) warnings.push_back(path + ": no ground truth, so no errors (--truth gives one)");
     runs.push_back(*std::move(run));
   }

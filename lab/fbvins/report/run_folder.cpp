@@ -112,7 +112,8 @@ Result<void> read_covariances(const std::string& path, std::vector<Odometry>& od
   return columns.done();
 }
 
-Result<std::vector<TrajectoryPoint>> read_truth(const std::string& path) {
+/// How a file is written that is neither plain TUM nor EuRoC goes to `recognised`.
+Result<std::vector<TrajectoryPoint>> read_truth(const std::string& path, std::string& recognised) {
   if (fs::is_directory(path) || path.ends_with(".zip")) {
     DatasetOptions options;
     options.prefetch_frames = 0;
@@ -123,6 +124,7 @@ Result<std::vector<TrajectoryPoint>> read_truth(const std::string& path) {
   }
   Result<TrajectoryFile> file = read_trajectory(path);
   if (!file) return file.error();
+  recognised = file->recognised;
   return std::move(file->points);
 }
 
@@ -173,7 +175,7 @@ Result<RunFolder> read_run_folder(const std::string& path, const std::string& tr
   if (Result<void> read = read_flight(folder, run); !read) return read.error();
   const fs::path own = folder / "ground_truth.csv";
   if (truth.empty() && !fs::exists(own)) return run;
-  Result<std::vector<TrajectoryPoint>> points = read_truth(truth.empty() ? own.string() : truth);
+  Result<std::vector<TrajectoryPoint>> points = read_truth(truth.empty() ? own.string() : truth, run.truth_recognised);
   if (!points) return points.error();
   run.truth = *std::move(points);
   return run;

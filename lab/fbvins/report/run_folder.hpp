@@ -25,6 +25,7 @@ struct RunFolder {
   std::string config;              ///< config.yaml, the effective configuration
   std::vector<Odometry> odometry;  ///< from trajectory.csv and covariance.csv, without statistics
   std::vector<TrajectoryPoint> truth;
+  std::string truth_recognised;  ///< TrajectoryFile::recognised
   CsvTable statistics, timing;
   std::optional<FlightFiles> flight;  ///< if `fbvins fly` wrote the folder
 

@@ -88,6 +88,7 @@ RelativeErrors relative_errors_of(const std::vector<std::vector<PosePair>>& part
 }  // namespace
 
 Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options) {
+  if (estimate.poses.empty()) return Error{ErrorCode::invalid_argument, "there is no estimated pose"};
   std::vector<PosePair> pairs = associate(truth, estimate, options.association);
   if (pairs.empty())
     return Error{ErrorCode::invalid_argument,

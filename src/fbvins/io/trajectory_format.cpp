@@ -6,13 +6,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "fbvins/io/kitti_poses.hpp"
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr std::size_t kPose = 8, kPoseAndVelocity = 11, kKitti = 12, kState = 17, kLooked = 200;
+constexpr std::size_t kPose = 8, kPoseAndVelocity = 11, kAngles = 7, kState = 17, kLooked = 200;
 
 /// Years 2001 to 2096.
 bool is_date(double seconds) { return seconds > 1e9 && seconds < 4e9; }
@@ -46,6 +48,38 @@ bool begins_with_number(const std::vector<std::vector<double>>& rows) {
   return rows[0][0] == 0 || rows[0][0] == 1;
 }
 
+/// Whether four numbers behind the stamp are a quaternion, and those behind the position are none.
+bool has_quaternion_first(const std::vector<std::vector<double>>& rows) {
+  const auto is_unit = [](const std::vector<double>& row, std::size_t at) {
+    double sum = 0;
+    for (std::size_t i = at; i < at + 4; ++i) sum += row[i] * row[i];
+    return std::abs(std::sqrt(sum) - 1) < 1e-3;
+  };
+  std::size_t first = 0, last = 0, whole = 0;
+  for (const auto& row : rows) {
+    if (row.size() < kPose) continue;
+    ++whole, first += is_unit(row, 1), last += is_unit(row, 4);
+  }
+  return whole > 0 && first == whole && 2 * last < whole;
+}
+
+/// Seven columns are a pose whose quaternion lacks one, unless the header says otherwise, or the last three cannot be of a
+/// quaternion.
+bool names_angles(std::string_view header) {
+  std::string text(header);
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text.find("roll") != std::string::npos && text.find("pitch") != std::string::npos && text.find("yaw") != std::string::npos;
+}
+
+constexpr double kTurn_rad = 6.3;
+double largest_angle(const std::vector<std::vector<double>>& rows) {
+  double out = 0;
+  for (const auto& row : rows)
+    for (std::size_t i = 4; i < std::min(row.size(), kAngles); ++i)
+      if (std::isfinite(row[i])) out = std::max(out, std::abs(row[i]));
+  return out;
+}
+
 /// Order of the quaternion by the names of the columns; none where they do not say.
 std::optional<bool> w_first_by(std::string_view header) {
   std::string text(header);
@@ -60,11 +94,14 @@ void describe(TrajectoryLayout& layout, bool usual_unit, bool assumed_order) {
   if (layout.separator == ';') said.emplace_back("columns between semicolons");
   if (layout.stamp == 1) said.emplace_back("a running number before the stamp");
   if (!usual_unit) said.push_back(fmt::format("stamps in {}", name_of(layout.unit_ns)));
-  const bool usual_order = layout.w_first == (layout.separator != ' ');
+  if (layout.quaternion_first) said.emplace_back("the quaternion before the position, as OpenVINS' state_est.txt has it");
+  if (layout.angles)
+    said.push_back(fmt::format("roll, pitch and yaw in {}", layout.angle_rad == 1 ? "radians" : "degrees"));
+  const bool usual_order = layout.angles || layout.w_first == (layout.separator != ' ');
   if (!usual_order) said.push_back(fmt::format("quaternions {}", layout.w_first ? "w x y z" : "x y z w"));
   const std::size_t known = layout.stamp + (layout.state ? kState : layout.velocity ? kPoseAndVelocity : kPose);
   if (layout.velocity) said.emplace_back("the velocity behind the pose");
-  else if (!layout.state && layout.columns > known)
+  else if (!layout.state && layout.columns > known && !layout.angles)
     said.push_back(fmt::format("{} further columns left out", layout.columns - known));
   layout.recognised = fmt::format("{}", fmt::join(said, ", "));
   if (assumed_order) layout.recognised += " (if that is wrong: --format wxyz)";
@@ -111,10 +148,8 @@ Result<TrajectoryLayout> recognise(const std::vector<CsvLine>& data, std::string
   std::nth_element(counts.begin(), counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2), counts.end());
   layout.columns = counts[counts.size() / 2];
   layout.stamp = begins_with_number(rows) ? 1 : 0;
-  if (layout.stamp == 0 && layout.columns == kKitti && rows[0].size() == kKitti && std::abs(rows[0][0]) <= 1.001)
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{}: looks like KITTI's poses, 12 numbers a row without a time: write it as TUM's (evo_traj kitti does with "
-                             "its times.txt)", file)};
+  if (looks_like_kitti(first))
+    return Error{ErrorCode::unsupported, fmt::format("{}: KITTI's poses, 12 numbers a row without a time: put its times.txt beside it", file)};
   std::vector<double> stamps;
   for (const auto& row : rows)
     if (row.size() > layout.stamp && std::isfinite(row[layout.stamp])) stamps.push_back(row[layout.stamp]);
@@ -125,8 +160,13 @@ Result<TrajectoryLayout> recognise(const std::vector<CsvLine>& data, std::string
   layout.unit_ns = wanted.unit_ns > 0 ? wanted.unit_ns : unit_of(stamps, euroc ? 1 : 1e9);
   const std::optional<bool> named = w_first_by(header);
   layout.w_first = wanted.w_first.value_or(named.value_or(euroc));
-  layout.state = layout.separator != ' ' && layout.stamp == 0 && layout.columns >= kState && layout.w_first;
-  layout.velocity = layout.separator != ' ' && layout.stamp == 0 && layout.columns == kPoseAndVelocity;
+  layout.quaternion_first = layout.stamp == 0 && has_quaternion_first(rows);
+  layout.angles = layout.stamp == 0 && layout.columns == kAngles &&
+                  (names_angles(header) || (layout.separator == ' ' && largest_angle(rows) > kTurn_rad));
+  if (layout.angles) layout.angle_rad = largest_angle(rows) > kTurn_rad ? std::numbers::pi / 180 : 1;
+  if (layout.quaternion_first) layout.w_first = wanted.w_first.value_or(named.value_or(false));
+  layout.state = layout.separator != ' ' && layout.stamp == 0 && layout.columns >= kState && layout.w_first && !layout.quaternion_first;
+  layout.velocity = layout.separator != ' ' && layout.stamp == 0 && layout.columns == kPoseAndVelocity && !layout.quaternion_first;
   const bool usual = euroc ? layout.unit_ns == 1 : layout.separator == ' ' && layout.unit_ns == 1e9;
   describe(layout, usual, layout.separator != ' ' && !layout.w_first && !named && !wanted.w_first && layout.stamp == 0);
   return layout;

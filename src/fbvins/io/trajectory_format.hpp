@@ -24,6 +24,9 @@ struct TrajectoryLayout {
   bool w_first = false;        ///< quaternion's order
   bool velocity = false;       ///< three columns behind the pose, in W
   bool state = false;          ///< EuRoC's: velocity and two biases
+  bool quaternion_first = false;  ///< before the position: OpenVINS' state_est.txt
+  bool angles = false;            ///< roll, pitch and yaw instead of a quaternion
+  double angle_rad = 1;           ///< their unit
   std::string recognised;
 };
 

@@ -3,9 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <map>
+#include <string>
 
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/kitti_poses.hpp"
+#include "fbvins/io/no_pose.hpp"
 #include "fbvins/io/numbers.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/io/trajectory_format.hpp"
@@ -31,8 +36,9 @@ RowVerdict set_pose(const double* p, double w, double x, double y, double z, Tra
 
 RowVerdict parse_row(const TrajectoryLayout& layout, const std::vector<std::string_view>& fields, TrajectoryPoint& point,
                      std::string& problem) {
-  if (fields.size() != layout.columns || fields.size() < layout.stamp + kPoseColumns) {
-    problem = fmt::format("{} columns where {} are needed", fields.size(), std::max(layout.columns, layout.stamp + kPoseColumns));
+  const std::size_t fewest = layout.stamp + kPoseColumns - (layout.angles ? 1 : 0);
+  if (fields.size() != layout.columns || fields.size() < fewest) {
+    problem = fmt::format("{} columns where {} are needed", fields.size(), std::max(layout.columns, fewest));
     return RowVerdict::malformed;
   }
   const std::string_view stamp = fields[layout.stamp];
@@ -44,11 +50,18 @@ RowVerdict parse_row(const TrajectoryLayout& layout, const std::vector<std::stri
   if (!t) return number && std::isnan(*number) ? RowVerdict::not_finite : RowVerdict::malformed;
   point.t = *t;
   double v[16];
-  const std::size_t count = layout.state ? 16 : layout.velocity ? 10 : 7;
+  const std::size_t count = layout.state ? 16 : layout.velocity ? 10 : layout.angles ? 6 : 7;
   const RowVerdict verdict = parse_doubles(fields, layout.stamp + 1, count, kLargestValue, v);
   if (verdict != RowVerdict::good) return verdict;
   if (layout.state || layout.velocity) point.v_WB = Vec3(v[7], v[8], v[9]);
   if (layout.state) point.bias = ImuBias{Vec3(v[10], v[11], v[12]), Vec3(v[13], v[14], v[15])};
+  if (layout.angles) {
+    const double a = layout.angle_rad;
+    const Quat q = Eigen::AngleAxisd(a * v[5], Vec3::UnitZ()) * Eigen::AngleAxisd(a * v[4], Vec3::UnitY()) *
+                   Eigen::AngleAxisd(a * v[3], Vec3::UnitX());
+    return set_pose(v, q.w(), q.x(), q.y(), q.z(), point, problem);
+  }
+  if (layout.quaternion_first) std::rotate(v, v + 4, v + 7);
   return layout.w_first ? set_pose(v, v[3], v[4], v[5], v[6], point, problem) : set_pose(v, v[6], v[3], v[4], v[5], point, problem);
 }
 
@@ -61,6 +74,7 @@ struct Row {
   Time t;
   TrajectoryPoint point;
   bool no_pose = false, hidden = false;
+  std::string health = {};  ///< of a row of ours without a pose
 };
 
 }  // namespace
@@ -90,6 +104,7 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
     const RowVerdict verdict = parse_row(*layout, fields, row.point, problem);
     row.t = row.point.t;
     row.no_pose = says_no_pose(fields);
+    if (row.no_pose) row.health = fmt::format("{}/{}", fields[kHealthColumn], fields[kHealthColumn + 1]);
     // Truth that is NaN where a marker was hidden: however many rows, the others are good.
     row.hidden = !row.no_pose && verdict == RowVerdict::not_finite && row.t != Time{};
     return row.no_pose && verdict == RowVerdict::not_finite ? RowVerdict::good : row.hidden ? RowVerdict::good : verdict;
@@ -98,14 +113,16 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
   TrajectoryFile out;
   out.counts = rows->counts;
   out.recognised = layout->recognised;
+  std::map<std::string, int> health;
   for (Row& row : rows->rows) {
     row.point.t = row.t;
-    if (row.no_pose) ++out.without_pose;
+    if (row.no_pose) ++out.without_pose, ++health[row.health];
     else if (row.hidden) ++nan_rows;
     else out.points.push_back(std::move(row.point));
   }
   out.counts.not_finite += nan_rows;
   if (nan_rows > 0 && out.counts.first_bad.empty()) out.counts.first_bad = fmt::format("{}: a value is not a usable number", file);
+  if (out.points.empty() && nan_rows == 0) return Error{ErrorCode::malformed, fmt::format("{}: {}", file, no_pose_sentence(health))};
   if (out.points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: no row has a pose", file)};
   return out;
 }
@@ -113,7 +130,19 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
 Result<TrajectoryFile> read_trajectory(const std::string& path, const TrajectoryFormat& format) {
   Result<std::string> text = read_file(path, kLargestTrajectory_bytes);
   if (!text) return text.error();
-  return parse_trajectory(*text, path, format);
+  // Of a flight without a pose; the file beside it says why.
+  const std::filesystem::path beside = std::filesystem::path(path).parent_path() / "trajectory.csv";
+  std::error_code ignored;
+  if (data_lines(*text).empty() && std::filesystem::path(path).filename() != beside.filename() && std::filesystem::exists(beside, ignored)) {
+    const Result<TrajectoryFile> whole = read_trajectory(beside.string());
+    if (!whole) return whole.error();
+  }
+  if (!looks_like_kitti(*text)) return parse_trajectory(*text, path, format);
+  const Result<KittiPoses> kitti = kitti_with_times(*text, path);
+  if (!kitti) return kitti.error();
+  Result<TrajectoryFile> out = parse_trajectory(kitti->tum, path, format);
+  if (out) out->recognised = fmt::format("KITTI's poses, with the times of {}", kitti->times);
+  return out;
 }
 
 }  // namespace fbvins

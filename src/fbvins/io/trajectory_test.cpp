@@ -213,7 +213,74 @@ TEST(Trajectory, RowsWithNaNAreCountedHoweverMany) {
 TEST(Trajectory, KittisPosesHaveNoTimes) {
   const auto file = parse_trajectory("1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n", "00.txt");
   ASSERT_FALSE(file.ok());
-  EXPECT_NE(file.error().message.find("00.txt: looks like KITTI's poses"), std::string::npos) << file.error().message;
+  EXPECT_NE(file.error().message.find("00.txt: KITTI's poses, 12 numbers a row without a time"), std::string::npos) << file.error().message;
+}
+
+TEST(Trajectory, KittisPosesWithTheirTimesBeside) {
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "fbvins_kitti";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder / "poses");
+  std::filesystem::create_directories(folder / "sequences/07");
+  std::ofstream(folder / "poses/07.txt") << "1 0 0 5 0 1 0 6 0 0 1 7\n0 -1 0 5 1 0 0 6 0 0 1 8\n";
+  const std::string path = (folder / "poses/07.txt").string();
+  EXPECT_NE(read_trajectory(path).error().message.find("put its times.txt beside it"), std::string::npos);
+  std::ofstream(folder / "sequences/07/times.txt") << "0.000000e+00\n1.037359e-01\n";
+  const auto file = read_trajectory(path);
+  ASSERT_TRUE(file.ok()) << file.error().message;
+  EXPECT_NE(file->recognised.find("07/times.txt"), std::string::npos) << file->recognised;
+  ASSERT_EQ(file->points.size(), 2u);
+  EXPECT_EQ(file->points[1].t, Time{103'735'900});
+  EXPECT_EQ(file->points[1].T_WB.p, Vec3(5, 6, 8));
+  EXPECT_NEAR(file->points[1].T_WB.q.w(), std::sqrt(0.5), 1e-9);
+  EXPECT_NEAR(file->points[1].T_WB.q.z(), std::sqrt(0.5), 1e-9);
+  std::ofstream(folder / "sequences/07/times.txt") << "0\n";
+  EXPECT_NE(read_trajectory(path).error().message.find("2 poses, and 1 times"), std::string::npos);
+  std::ofstream(folder / "poses/07.txt") << "1 0 0 5 0 2 0 6 0 0 1 7\n";
+  EXPECT_NE(read_trajectory(path).error().message.find("07.txt:1: not a rotation"), std::string::npos);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Trajectory, OpenVinsStateHasTheQuaternionFirst) {
+  std::string text = "# timestamp(s) q p v bg ba cam_imu_dt num_cam cam0_k cam0_d cam0_rot cam0_trans\n";
+  for (int i = 0; i < 5; ++i) text += fmt::format("1403636624.{}63556 0.6 0 0 0.8 {} 2 3 0.1 0.2 0.3 0 0 0 0 0 0 0.0 2\n", i, 10 + i);
+  const auto file = parse_trajectory(text, "state_est.txt");
+  ASSERT_TRUE(file.ok()) << file.error().message;
+  EXPECT_NE(file->recognised.find("the quaternion before the position"), std::string::npos) << file->recognised;
+  ASSERT_EQ(file->points.size(), 5u);
+  EXPECT_EQ(file->points[2].T_WB.p, Vec3(12, 2, 3));
+  EXPECT_NEAR(file->points[2].T_WB.q.x(), 0.6, 1e-12);
+  EXPECT_NEAR(file->points[2].T_WB.q.w(), 0.8, 1e-12);
+}
+
+TEST(Trajectory, AnglesOnlyWhereTheFileSaysSoOrTheyCanBeNothingElse) {
+  const auto degrees = parse_trajectory("#t x y z roll pitch yaw\n1.5 1 2 3 0 0 90\n2.5 1 2 3 0 0 -90\n", "a.txt");
+  ASSERT_TRUE(degrees.ok()) << degrees.error().message;
+  EXPECT_NE(degrees->recognised.find("roll, pitch and yaw in degrees"), std::string::npos) << degrees->recognised;
+  EXPECT_NEAR(degrees->points[0].T_WB.q.z(), std::sqrt(0.5), 1e-12);
+  const auto radians = parse_trajectory("#t x y z roll pitch yaw\n1.5 1 2 3 0 0 1.5\n", "a.txt");
+  ASSERT_TRUE(radians.ok()) << radians.error().message;
+  EXPECT_NEAR(radians->points[0].T_WB.q.z(), std::sin(0.75), 1e-12);
+  EXPECT_TRUE(parse_trajectory("1.5 1 2 3 0 0 90\n2.5 1 2 3 0 0 -90\n", "a.txt").ok());
+  EXPECT_FALSE(parse_trajectory("1.5 1 2 3 0 0 0.5\n2.5 1 2 3 0 0 0.6\n", "a.txt").ok()) << "a column is missing";
+  EXPECT_FALSE(parse_trajectory("1403636624463555584,0.1,0.2,0.3,8.1,0.2,-3\n1403636624468555584,0.1,0.2,0.3,8.1,0.2,-3\n", "imu.csv").ok());
+}
+
+TEST(Trajectory, OfAFlightWithoutAPoseHealthIsSaid) {
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "fbvins_no_pose";
+  std::filesystem::create_directories(folder);
+  std::string row = ",nan";
+  for (int i = 0; i < 36; ++i) row += ",nan";
+  std::string text = "#timestamp\n";
+  for (int i = 0; i < 4; ++i) text += fmt::format("{}{},initialising,{},0\n", 1403636624463555584 + i * 50000000, row, i < 3 ? "imu_gap" : "few_tracks");
+  std::ofstream(folder / "trajectory.csv") << text;
+  std::ofstream(folder / "trajectory_tum.txt") << "";
+  for (const char* name : {"trajectory.csv", "trajectory_tum.txt"}) {
+    const auto file = read_trajectory((folder / name).string());
+    ASSERT_FALSE(file.ok());
+    EXPECT_NE(file.error().message.find("no pose in any of 4 images: health is initialising/imu_gap in 75 % of them"), std::string::npos)
+        << file.error().message;
+  }
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace trajectory_test

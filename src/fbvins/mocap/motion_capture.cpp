@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/kitti_poses.hpp"
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/numbers.hpp"
 #include "fbvins/io/trajectory.hpp"
@@ -141,7 +142,9 @@ Result<MotionCapture> read_plain(std::string_view text, const std::string& file)
   MarkerTrack track;
   for (const TrajectoryPoint& point : trajectory->points) track.push_back({point.t, point.T_WB.cast_frames<V, K>()});
   const bool commas = data_lines(text.substr(0, 1u << 16u)).front().text.find(',') != std::string_view::npos;
-  return MotionCapture{commas ? "EuRoC CSV" : "TUM", {{"", std::move(track), trajectory->without_pose}}, trajectory->counts};
+  std::string format = commas ? "EuRoC CSV" : "TUM";
+  if (!trajectory->recognised.empty()) format += ": " + trajectory->recognised;
+  return MotionCapture{std::move(format), {{"", std::move(track), trajectory->without_pose}}, trajectory->counts};
 }
 
 }  // namespace
@@ -157,8 +160,13 @@ Result<MotionCapture> read_motion_capture(const std::string& path) {
   const auto bytes = open_bytes(path);
   if (!bytes) return bytes.error();
   if ((*bytes)->read(0, kMcapMagic.size()) == kMcapMagic) return read_marker_topics(*bytes, path);
-  const auto text = read_file(path, kLargestFile_bytes);
+  auto text = read_file(path, kLargestFile_bytes);
   if (!text) return text.error();
+  if (looks_like_kitti(*text)) {
+    auto kitti = kitti_with_times(*text, path);
+    if (!kitti) return kitti.error();
+    text = std::move(kitti->tum);
+  }
   return parse_motion_capture(*text, path);
 }
 

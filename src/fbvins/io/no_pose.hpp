@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: what is said of a flight without a single pose. A pure function.
+//
+//   no_pose_sentence({{"initialising/imu_gap", 340}})
+//     -> "no pose in any of 340 images: health is initialising/imu_gap in all of them (docs/troubleshooting.md)"
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace fbvins {
+
+/// The health and reason of most images, with their share.
+std::string no_pose_sentence(const std::map<std::string, int>& images_by_health);
+
+}  // namespace fbvins
