@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
@@ -14,6 +16,7 @@
 #include "apps/terminal.hpp"
 #include "fbvins/bags/bag_survey.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/io/known_file.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -22,6 +25,7 @@ constexpr const char* kExamples = R"(examples:
   fbvins info MH_01_easy
   fbvins info MH_01_easy.zip --json
   fbvins info flight.bag                         topics and rates of a bag, also without a calibration
+  fbvins info poses.txt                          what a file is that is no recording, and what it is for
 )";
 
 struct Arguments {
@@ -132,6 +136,24 @@ int show_bag(const Arguments& arguments, const BagSurvey& bag, const Error& why)
   return kOk;
 }
 
+/// What a file is that is no recording.
+std::optional<KnownFile> file_of(const std::string& path) {
+  if (const Result<StereoRig> rig = calibration_in(path)) {
+    std::string what = fmt::format("a calibration of {} camera{}", rig->camera_count(), rig->camera_count() == 1 ? "" : "s");
+    for (int i = 0; i < rig->camera_count(); ++i) what += fmt::format("; camera {}: {}", i, lens_of(rig->camera(i)));
+    if (rig->has_right()) what += fmt::format("; baseline {:.4f} m", rig->T_C1C0().p.norm());
+    return KnownFile{what + "; " + times_of(*rig), "give it by --calibration"};
+  }
+  return known_file(path);
+}
+
+int show_file(const Arguments& arguments, const KnownFile& file) {
+  const std::string& path = arguments.recording.path;
+  if (arguments.json) fmt::print("{}\n", Json{{"file", path}, {"what", file.what}, {"use", file.use}}.dump(2));
+  else fmt::print("{}: this is {}: {}\n", bold(path), file.what, file.use);
+  return kOk;
+}
+
 int show(const Arguments& arguments) {
   DatasetOptions options;
   options.prefetch_frames = 0;
@@ -140,6 +162,7 @@ int show(const Arguments& arguments) {
   if (!data) {
     if (const auto bag = survey_recording(arguments.recording); bag && !bag->topics.empty())
       return show_bag(arguments, *bag, data.error());
+    if (const auto file = file_of(arguments.recording.path)) return show_file(arguments, *file);
     return fail(data.error().message);
   }
   RecordingWarnings().print((*data)->info());

@@ -2,6 +2,7 @@
 #include "apps/open_recording.hpp"
 #include "fbvins/bags/bag_poses.hpp"
 #include "fbvins/bags/bag_survey.hpp"
+#include "fbvins/bags/calibration.hpp"
 #include "fbvins/bags/recording.hpp"
 
 namespace fbvins::app {
@@ -28,6 +29,8 @@ std::optional<BagSurvey> survey_recording(const RecordingArguments& arguments) {
   Result<BagSurvey> survey = survey_bag(arguments.path, options_of(arguments, {}));
   return survey ? std::optional(*std::move(survey)) : std::nullopt;
 }
+
+Result<StereoRig> calibration_in(const std::string& path) { return load_calibration(path); }
 
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic) {
   if (is_bag(path)) return read_bag_poses(path, topic);

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "fbvins/bags/bag_survey.hpp"
+#include "fbvins/io/kalibr.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -56,6 +57,8 @@ bool is_for_bags(int argc, char** argv) {
   constexpr std::string_view kCommands[] = {"run", "info", "doctor", "eval"};
   if (argc < 3 || std::find(std::begin(kCommands), std::end(kCommands), std::string_view(argv[1])) == std::end(kCommands))
     return false;
+  const std::string last = argv[argc - 1];
+  if (argv[1] == std::string_view("info") && (last.ends_with(".yaml") || last.ends_with(".yml") || last.ends_with(".json"))) return true;
   for (int i = 2; i < argc; ++i) {
     const std::string_view argument = argv[i], before = argv[i - 1];
     if (argument.starts_with("--topics")) return true;
@@ -67,6 +70,8 @@ bool is_for_bags(int argc, char** argv) {
 }
 
 std::optional<BagSurvey> survey_recording(const RecordingArguments&) { return std::nullopt; }
+
+Result<StereoRig> calibration_in(const std::string& path) { return load_kalibr(path); }
 
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic) {
   if (topic.empty()) return read_pose_file(path);

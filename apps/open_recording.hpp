@@ -52,6 +52,9 @@ class RecordingWarnings {
 /// program reads none.
 std::optional<BagSurvey> survey_recording(const RecordingArguments& arguments);
 
+/// The calibration in a file of any kind that this program reads; an error where it is none.
+Result<StereoRig> calibration_in(const std::string& path);
+
 /// A trajectory file; says how an unusual one was read, and warns of rows that are left out.
 Result<Trajectory<W>> read_pose_file(const std::string& path, const TrajectoryFormat& format = {});
 /// The poses of a file: TUM or EuRoC; in fbvins-bags also of a bag, from `topic` or its only topic of poses.
