@@ -83,8 +83,9 @@ std::string to_text(const LiveSummary& s) {
       "images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock jumps {}, restarts {}\n", c.images,
       s.totals.with_pose, c.images_dropped, c.images_incomplete, c.imu, c.imu_late, c.clock_leaps, c.resets);
   if (c.clock_leaps > 0)
-    text += fmt::format("the sensors' clock was set, wrapped or began again {} x: its stamps are continued by this machine's clock\n",
-                        c.clock_leaps);
+    text +=
+        fmt::format("the sensors' clock was set, wrapped or began again {} x: its stamps are continued by this machine's clock\n",
+                    c.clock_leaps);
   if (c.events_lost > 0) text += fmt::format("events that a slow output did not get: {}\n", c.events_lost);
   text += "images by health:";
   for (const auto& [name, images] : s.totals.health) text += fmt::format(" {} {}", name, images);

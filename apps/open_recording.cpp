@@ -58,7 +58,8 @@ bool is_for_bags(int argc, char** argv) {
   if (argc < 3 || std::find(std::begin(kCommands), std::end(kCommands), std::string_view(argv[1])) == std::end(kCommands))
     return false;
   const std::string last = argv[argc - 1];
-  if (argv[1] == std::string_view("info") && (last.ends_with(".yaml") || last.ends_with(".yml") || last.ends_with(".json"))) return true;
+  if (argv[1] == std::string_view("info") && (last.ends_with(".yaml") || last.ends_with(".yml") || last.ends_with(".json")))
+    return true;
   for (int i = 2; i < argc; ++i) {
     const std::string_view argument = argv[i], before = argv[i - 1];
     if (argument.starts_with("--topics")) return true;

@@ -13,7 +13,8 @@ namespace fbvins::app {
 /// a library that the source needs.
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options);
 
-/// With the calibration that is given read: of all formats that recordings are given, where this program reads them, else Kalibr's.
+/// With the calibration that is given read: of all formats that recordings are given, where this program reads them, else
+/// Kalibr's.
 Result<DatasetOptions> with_calibration(DatasetOptions options);
 
 }  // namespace fbvins::app

@@ -91,8 +91,9 @@ std::string map_text(const MapSummary& m) {
   std::string text = fmt::format("map: {} keyframes of {}, {} loops, {} refused by the odometry, {} left out by the graph\n",
                                  m.keyframes_in_map, m.keyframes, m.loops, m.refused, m.left_out);
   if (!m.loaded.empty())
-    text += m.localised_after_s ? fmt::format("map: the flight was found in {} {:.1f} s after its first pose\n", m.loaded, *m.localised_after_s)
-                                : fmt::format("map: the flight was never found in {}: its poses in M are not known\n", m.loaded);
+    text += m.localised_after_s
+                ? fmt::format("map: the flight was found in {} {:.1f} s after its first pose\n", m.loaded, *m.localised_after_s)
+                : fmt::format("map: the flight was never found in {}: its poses in M are not known\n", m.loaded);
   else if (!m.localised_after_s) text += "map: never localised\n";
   for (const MapSummary::Found& f : m.found_again)
     text += fmt::format("map: found again {:.1f} s after the restart at {:.1f} s\n", f.after_s, f.restart_s);

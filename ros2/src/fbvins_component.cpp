@@ -78,7 +78,9 @@ std::shared_ptr<const fbvins::Image> image_of(const sensor_msgs::msg::Image::Con
 /// Frames; an empty base_frame: there is no vehicle, and the odometry is that of the IMU.
 struct Names {
   explicit Names(const fbvins::Ros2Options& options)
-      : odometry(options.odometry_frame), imu(options.imu_frame), base(options.base_frame.empty() ? imu : options.base_frame),
+      : odometry(options.odometry_frame),
+        imu(options.imu_frame),
+        base(options.base_frame.empty() ? imu : options.base_frame),
         publish_tf(options.publish_tf) {}
   std::string odometry, imu, base;
   bool publish_tf;

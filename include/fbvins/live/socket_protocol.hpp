@@ -107,7 +107,7 @@ enum {
   FBVINS_SOCKET_HAS_CAMERAS = 2,  ///< since version 1.2: the fields from `cameras` on are filled; two cameras without it
   FBVINS_SOCKET_HAS_DEPTH =
       4,  ///< since version 1.3: one camera, with a depth sensor; those from `depth_offset_bytes` on are filled
-  FBVINS_SOCKET_HAS_TIMES = 8,         ///< since version 1.4: `times` is filled
+  FBVINS_SOCKET_HAS_TIMES = 8,          ///< since version 1.4: `times` is filled
   FBVINS_SOCKET_HAS_DEPTH_CAMERA = 16,  ///< since version 1.6: with FBVINS_SOCKET_HAS_DEPTH, those from `depth_width_px` on are
   FBVINS_SOCKET_HAS_LENSES = 32,        ///< since version 1.8: `more_distortion` is filled
   FBVINS_SOCKET_HAS_IMU_AXES = 64       ///< since version 1.8: `imu_axes` is filled; without it the readings are corrected
@@ -145,8 +145,8 @@ typedef struct FbvinsSocketHello {
   uint32_t depth_width_px, depth_height_px;
   FbvinsSocketCamera depth_camera;  ///< of the rig: the depth sensor's own lens and pose
   // Since version 1.8, with FBVINS_SOCKET_HAS_LENSES; else 0 or left out:
-  /// Of cameras 0, 1 ... and, last, of the depth sensor: p2 (omni-radtan, whose first four are xi k1 k2 p1), k3 (radtan with five),
-  /// k3 k4 k5 k6 (rational); both behind k1 k2 p1 p2.
+  /// Of cameras 0, 1 ... and, last, of the depth sensor: p2 (omni-radtan, whose first four are xi k1 k2 p1), k3 (radtan with
+  /// five), k3 k4 k5 k6 (rational); both behind k1 k2 p1 p2.
   double more_distortion[FBVINS_SOCKET_MOST_CAMERAS + 1][4];
   // Since version 1.8, with FBVINS_SOCKET_HAS_IMU_AXES; else 0 or left out:
   FbvinsSocketImuAxes imu_axes;

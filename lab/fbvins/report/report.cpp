@@ -201,8 +201,10 @@ Result<std::vector<std::string>> write_report(const std::vector<std::string>& fo
       ++health[fmt::format("{}/{}", to_string(o.health.state), to_string(o.health.reason))];
       has_pose |= o.health.has_pose();
     }
-    if (!has_pose) warnings.push_back(fmt::format("{}: {}; `fbvins doctor` examines the recording", path, no_pose_sentence(health)));
-    if (!run->truth_recognised.empty()) warnings.push_back(fmt::format("{}: {}", truth.empty() ? path : truth, run->truth_recognised));
+    if (!has_pose)
+      warnings.push_back(fmt::format("{}: {}; `fbvins doctor` examines the recording", path, no_pose_sentence(health)));
+    if (!run->truth_recognised.empty())
+      warnings.push_back(fmt::format("{}: {}", truth.empty() ? path : truth, run->truth_recognised));
     if (run->truth.empty()) warnings.push_back(path + ": no ground truth, so no errors (--truth gives one)");
     runs.push_back(*std::move(run));
   }

@@ -194,8 +194,7 @@ JoinedClock continue_clock(BagContents& contents, const ChosenTopics& topics) {
   for (StampStream& stream : streams) all.push_back(&stream);
   JoinedClock clock = join_clock(all);
   for (std::size_t i = 0; i < images.size(); ++i) take_clock(streams[i], contents.images.at(images[i]).rows);
-  for (std::size_t i = 0; i < readings.size(); ++i)
-    take_clock(streams[images.size() + i], contents.imu.at(readings[i]).samples);
+  for (std::size_t i = 0; i < readings.size(); ++i) take_clock(streams[images.size() + i], contents.imu.at(readings[i]).samples);
   follow_clock(clock, contents.ground_truth);
   return clock;
 }

@@ -18,11 +18,11 @@
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/camera_order.hpp"
-#include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
+#include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
@@ -52,9 +52,8 @@ class BagRecording {
       bag->only(start - kImuLeadIn - kRecordingDelay, o.duration_s > 0 ? end + kRecordingDelay : kForever);
     }
     contents_ = read_contents(*bag, {}, options_.by_recording);
-    for (auto step :
-         {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::continue_stamps, &BagRecording::calibrate,
-          &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
+    for (auto step : {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::continue_stamps,
+                      &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
       if (Result<void> done = (this->*step)(); !done)
         return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
     describe_bag(*bag);

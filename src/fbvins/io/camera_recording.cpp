@@ -30,7 +30,8 @@ class EurocCameras {
     Result<EurocRows> rows = read_euroc_rows(*files_, root_, sensors);
     if (!rows) return rows.error();
     out_.warnings = rows->clock.said;
-    for (std::size_t k = 0; k < rows->cameras.size(); ++k) list_camera(static_cast<int>(k), sensors.cameras[k], rows->cameras[k].rows);
+    for (std::size_t k = 0; k < rows->cameras.size(); ++k)
+      list_camera(static_cast<int>(k), sensors.cameras[k], rows->cameras[k].rows);
     if (sensors.imu)
       if (Result<void> done = take_imu(std::move(rows->imu.rows)); !done) return done.error();
     sort_by_time(out_.images);

@@ -42,8 +42,8 @@ bool go_on(const std::vector<Time>& stamps, std::size_t from, std::size_t to, Du
 /// Whether the rows [part, i) have stamps where those from i on go again.
 bool times_are_taken(const std::vector<Time>& stamps, std::size_t part, std::size_t i, Duration interval) {
   const Time from = std::max(stamps[i], stamps[part]), to = stamps[i - 1];
-  const auto here = std::count_if(stamps.begin() + static_cast<std::ptrdiff_t>(part), stamps.begin() + static_cast<std::ptrdiff_t>(i),
-                                  [&](Time t) { return t >= from && t <= to; });
+  const auto here = std::count_if(stamps.begin() + static_cast<std::ptrdiff_t>(part),
+                                  stamps.begin() + static_cast<std::ptrdiff_t>(i), [&](Time t) { return t >= from && t <= to; });
   return static_cast<double>(here) >= kTaken * (1 + static_cast<double>((to - from).ns) / static_cast<double>(interval.ns));
 }
 
@@ -124,10 +124,11 @@ void leave_out_rest(const std::vector<StampStream*>& streams, JoinedClock& out) 
   }
   for (StampStream* s : streams)
     if (s->steps.empty())
-      s->kept = static_cast<std::size_t>(std::ranges::find_if(s->stamps, [&](Time t) { return t > end + kSameStep; }) - s->stamps.begin());
-  out.said.push_back(fmt::format("the stamps of {} step back by {:.3f} s{}: what comes after that cannot be put in time, and is left out",
-                                 stepped, back.seconds(),
-                                 others.empty() ? ", by different amounts or not equally often" : ", those of " + others + " do not"));
+      s->kept = static_cast<std::size_t>(std::ranges::find_if(s->stamps, [&](Time t) { return t > end + kSameStep; }) -
+                                         s->stamps.begin());
+  out.said.push_back(fmt::format(
+      "the stamps of {} step back by {:.3f} s{}: what comes after that cannot be put in time, and is left out", stepped,
+      back.seconds(), others.empty() ? ", by different amounts or not equally often" : ", those of " + others + " do not"));
 }
 
 }  // namespace

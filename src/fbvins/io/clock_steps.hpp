@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private: recordings whose clock did not run on: a counter that wrapped, a clock that was set back, a device that started again.
 // Stamps of a stream are given in the order in which they were recorded. After a step back nobody knows how much time has passed:
-// the stamps are continued after a gap, and the frame after it says so (StereoFrame::after_clock_step). Pure functions, any thread.
+// the stamps are continued after a gap, and the frame after it says so (StereoFrame::after_clock_step). Pure functions, any
+// thread.
 //
 //   StampStream imu = stream_of("imu0/data.csv", readings), images = stream_of("cam0/data.csv", rows);
 //   JoinedClock clock = join_clock({&imu, &images});
@@ -32,8 +33,8 @@ struct StampStream {
   std::string name;  ///< as sentences call it
   std::vector<Time> stamps;
   std::function<bool(std::size_t, std::size_t)> same = {};  ///< whether two of its rows say the same, wherever that can be told
-  std::vector<std::size_t> steps = {};  ///< where parts begin, after the first one; filled by join_clock
-  std::size_t kept = 0;                 ///< rows from the beginning that are used; filled by join_clock
+  std::vector<std::size_t> steps = {};                      ///< where parts begin, after the first one; filled by join_clock
+  std::size_t kept = 0;                                     ///< rows from the beginning that are used; filled by join_clock
 };
 
 /// Whose rows stay where they are until join_clock().
@@ -67,8 +68,8 @@ void take_clock(const StampStream& stream, std::vector<Row>& rows) {
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].t = stream.stamps[i];
 }
 
-/// Gives rows of somebody who knows the same clock, ground truth, its shifts; where they do not step as often, what comes after the
-/// first step is left out.
+/// Gives rows of somebody who knows the same clock, ground truth, its shifts; where they do not step as often, what comes after
+/// the first step is left out.
 template <class Row>
 void follow_clock(const JoinedClock& clock, std::vector<Row>& rows) {
   if (clock.begins.empty()) return;
@@ -78,7 +79,8 @@ void follow_clock(const JoinedClock& clock, std::vector<Row>& rows) {
     return;
   }
   for (std::size_t k = 0; k < steps.size(); ++k)
-    for (std::size_t i = steps[k]; i < (k + 1 < steps.size() ? steps[k + 1] : rows.size()); ++i) rows[i].t = rows[i].t + clock.added[k + 1];
+    for (std::size_t i = steps[k]; i < (k + 1 < steps.size() ? steps[k + 1] : rows.size()); ++i)
+      rows[i].t = rows[i].t + clock.added[k + 1];
 }
 
 }  // namespace fbvins

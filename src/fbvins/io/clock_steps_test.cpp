@@ -77,7 +77,8 @@ TEST(ClockSteps, WhatStepsAloneEndsThere) {
 
 TEST(ClockSteps, ReadingsThatCameTwiceAreNone) {
   std::vector<ImuSample> readings;
-  for (const Time t : stamps(2000, 5, 2000, 0)) readings.push_back({t, Vec3::Constant(static_cast<double>(t.ns % 1000)), Vec3::Zero()});
+  for (const Time t : stamps(2000, 5, 2000, 0))
+    readings.push_back({t, Vec3::Constant(static_cast<double>(t.ns % 1000)), Vec3::Zero()});
   const std::vector<ImuSample> again(readings.begin() + 700, readings.begin() + 1000);
   readings.insert(readings.begin() + 1000, again.begin(), again.end());
   StampStream images{"images", stamps(200, 50, 200, 0)}, imu = stream_of("imu", readings);
@@ -134,7 +135,9 @@ TEST(ClockSteps, ARecordingBeginsAnewAfterThem) {
   EXPECT_EQ((*data)->info().frames, 40) << "no image is left out";
   EXPECT_EQ((*data)->info().imu_samples, 400);
   EXPECT_EQ((*data)->info().clock_steps.size(), 1u);
-  EXPECT_EQ(std::ranges::count_if((*data)->info().warnings, [](const std::string& w) { return w.find("set back by 0.3") != w.npos; }), 1);
+  EXPECT_EQ(
+      std::ranges::count_if((*data)->info().warnings, [](const std::string& w) { return w.find("set back by 0.3") != w.npos; }),
+      1);
   int images = 0, marked = -1;
   Time newest{-1};
   while (auto event = (*data)->next()) {

@@ -89,7 +89,8 @@ std::optional<SensorEvent> Dataset::next() {
     auto frame = next_frame();
     if (!frame) continue;
     const std::vector<Time>& steps = contents_.info.clock_steps;
-    for (; next_clock_step_ < steps.size() && steps[next_clock_step_] <= frame->t; ++next_clock_step_) frame->after_clock_step = true;
+    for (; next_clock_step_ < steps.size() && steps[next_clock_step_] <= frame->t; ++next_clock_step_)
+      frame->after_clock_step = true;
     return *std::move(frame);
   }
 }

@@ -12,8 +12,8 @@ namespace fbvins {
 /// Fills in the fields of `contents.info` on frames and IMU samples, with a warning for each long gap. Needs a frame.
 void describe(DatasetContents& contents);
 
-/// Where the clock of frames and readings, in the order recorded, wrapped or stepped back (clock_steps.hpp): continues the stamps,
-/// with a warning that names the recording.
+/// Where the clock of frames and readings, in the order recorded, wrapped or stepped back (clock_steps.hpp): continues the
+/// stamps, with a warning that names the recording.
 void continue_stamps(DatasetContents& contents, const std::string& name);
 
 /// With a warning for each of several cameras whose images stay away for a second or more while another's come.

@@ -108,9 +108,10 @@ TEST(DatasetTest, AnImuThatIsTooSlowIsSaid) {
       if (warning.find("readings a second") != std::string::npos) out += warning;
     return out;
   };
-  EXPECT_EQ(said(20, 200),
-            "IMU: 20 readings a second where 200 are declared, too few for an estimate (`imu_gap`, `alignment_refused`): set the sensor "
-            "to 100 to 400 Hz");
+  EXPECT_EQ(
+      said(20, 200),
+      "IMU: 20 readings a second where 200 are declared, too few for an estimate (`imu_gap`, `alignment_refused`): set the sensor "
+      "to 100 to 400 Hz");
   EXPECT_EQ(said(40, 40), "IMU: 40 readings a second, between which the motion is hardly known: set the sensor to 100 to 400 Hz");
   EXPECT_EQ(said(100, 200), "");
 }

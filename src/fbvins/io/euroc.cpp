@@ -59,9 +59,8 @@ class EurocReader {
     out_.info.name = dataset_name(path);
     out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
     find_cameras();
-    for (auto step :
-         {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_rows, &EurocReader::read_frames,
-          &EurocReader::read_imu})
+    for (auto step : {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_rows,
+                      &EurocReader::read_frames, &EurocReader::read_imu})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();

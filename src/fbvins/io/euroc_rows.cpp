@@ -44,8 +44,9 @@ std::vector<std::string> row_warnings(const RowCounts& c, const std::string& fil
   std::vector<std::string> out;
   if (c.wraps > 0) out.push_back(wrapped_sentence(file, c.wraps));
   if (c.bad() > 0)
-    out.push_back(fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}",
-                              file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
+    out.push_back(
+        fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}",
+                    file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
   return out;
 }
 

@@ -31,7 +31,8 @@ std::vector<std::filesystem::path> places_of_times(const std::filesystem::path& 
 std::optional<std::string> as_tum(const std::array<double, kNumbers>& m) {
   Mat3 R;
   R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
-  if (!((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kNoRotation) || !(R.determinant() > 0)) return std::nullopt;
+  if (!((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kNoRotation) || !(R.determinant() > 0))
+    return std::nullopt;
   const Quat q = Quat(R).normalized();
   return fmt::format("{} {} {} {} {} {} {}", m[3], m[7], m[11], q.x(), q.y(), q.z(), q.w());
 }
@@ -59,7 +60,8 @@ Result<KittiPoses> kitti_with_times(std::string_view text, const std::string& pa
   if (!beside) return beside.error();
   const std::vector<CsvLine> poses = data_lines(text), times = data_lines(*beside);
   if (poses.size() != times.size())
-    return Error{ErrorCode::malformed, fmt::format("{}: {} poses, and {} times in {}", path, poses.size(), times.size(), out.times)};
+    return Error{ErrorCode::malformed,
+                 fmt::format("{}: {} poses, and {} times in {}", path, poses.size(), times.size(), out.times)};
   std::vector<std::string_view> fields;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     split_at_blanks(poses[i].text, fields);
@@ -67,7 +69,8 @@ Result<KittiPoses> kitti_with_times(std::string_view text, const std::string& pa
     const bool numbers = fields.size() == kNumbers && parse_doubles(fields, 0, kNumbers, 1e9, m.data()) == RowVerdict::good;
     const auto pose = numbers ? as_tum(m) : std::nullopt;
     if (!pose)
-      return Error{ErrorCode::malformed, fmt::format("{}:{}: not a rotation and a translation in 12 numbers", path, poses[i].number)};
+      return Error{ErrorCode::malformed,
+                   fmt::format("{}:{}: not a rotation and a translation in 12 numbers", path, poses[i].number)};
     out.tum += fmt::format("{} {}\n", times[i].text, *pose);
   }
   return out;

@@ -32,8 +32,10 @@ struct Signature {
   const char *what, *use;
 };
 
-constexpr const char *kImage = "an image", *kNoRecording = "a recording is a folder in EuRoC's layout or a bag: a single image is none",
-                     *kFlightLog = "it holds no images: poses of its messages can be compared once they are written as TUM's or EuRoC's rows";
+constexpr const char
+    *kImage = "an image",
+    *kNoRecording = "a recording is a folder in EuRoC's layout or a bag: a single image is none",
+    *kFlightLog = "it holds no images: poses of its messages can be compared once they are written as TUM's or EuRoC's rows";
 
 constexpr Signature kSignatures[] = {
     {"FBVPLACE"sv, "a map", "give it by --load-map or --map; `fbvins map info` says what is in it"},
@@ -63,8 +65,10 @@ std::string beginning_of(const std::string& path) {
 std::optional<KnownFile> by_bytes(const std::string& path, string_view bytes) {
   for (const Signature& s : kSignatures)
     if (bytes.starts_with(s.bytes)) return KnownFile{s.what, s.use};
-  if (bytes.size() > 12 && bytes.substr(4, 4) == "ftyp") return KnownFile{"a film (MP4)", "it has no stamps of its images and no IMU: record a bag"};
-  if (path.ends_with(".safetensors")) return KnownFile{"weights of a network", "give those of `boost` by frontend.boost.booster.weights"};
+  if (bytes.size() > 12 && bytes.substr(4, 4) == "ftyp")
+    return KnownFile{"a film (MP4)", "it has no stamps of its images and no IMU: record a bag"};
+  if (path.ends_with(".safetensors"))
+    return KnownFile{"weights of a network", "give those of `boost` by frontend.boost.booster.weights"};
   if (path.ends_with(".tlog")) return KnownFile{"a telemetry log of MAVLink", kFlightLog};
   return std::nullopt;
 }
@@ -81,7 +85,8 @@ std::optional<KnownFile> by_words(const std::string& path, const std::string& te
   if (text.find("\"result\"") != std::string::npos && text.find("\"timing\"") != std::string::npos)
     return KnownFile{"the summary of a run", "`fbvins report` shows the folder in which it lies"};
   if (text.starts_with("# camera ") || text.find("EKF2_") != std::string::npos)
-    if (path.ends_with(".params")) return KnownFile{"parameters of a flight controller", "load them with its ground station (docs/px4.md)"};
+    if (path.ends_with(".params"))
+      return KnownFile{"parameters of a flight controller", "load them with its ground station (docs/px4.md)"};
   if (const std::string foreign = foreign_file(text); !foreign.empty()) {  // "this is WHAT: WHAT TO DO"
     const std::size_t colon = foreign.find(": ");
     return KnownFile{foreign.substr(8, colon - 8), foreign.substr(colon + 2)};
@@ -92,13 +97,17 @@ std::optional<KnownFile> by_words(const std::string& path, const std::string& te
 /// The rows of an IMU, a list of images, or a trajectory.
 std::optional<KnownFile> by_rows(const std::string& path, const std::string& text) {
   if (const auto images = read_image_rows(text, path); images)
-    return KnownFile{span_of(images->rows, "images, listed as EuRoC's camN/data.csv does,"), "the folder with cam0 and imu0 is the recording"};
+    return KnownFile{span_of(images->rows, "images, listed as EuRoC's camN/data.csv does,"),
+                     "the folder with cam0 and imu0 is the recording"};
   if (const auto imu = read_imu_csv(path); imu)
-    return KnownFile{span_of(*imu, "readings of an IMU, as in EuRoC's imu0/data.csv,"), "the folder with cam0 and imu0 is the recording"};
+    return KnownFile{span_of(*imu, "readings of an IMU, as in EuRoC's imu0/data.csv,"),
+                     "the folder with cam0 and imu0 is the recording"};
   if (const auto poses = read_trajectory(path); poses)
-    return KnownFile{span_of(poses->points, "poses, a trajectory") + (poses->recognised.empty() ? "" : " (" + poses->recognised + ")"),
-                     "`fbvins eval`, `fbvins mocap` and `fbvins report --truth` read it"};
-  if (looks_like_kitti(text)) return KnownFile{"KITTI's poses, without times", "with its times.txt beside it `fbvins eval` reads it"};
+    return KnownFile{
+        span_of(poses->points, "poses, a trajectory") + (poses->recognised.empty() ? "" : " (" + poses->recognised + ")"),
+        "`fbvins eval`, `fbvins mocap` and `fbvins report --truth` read it"};
+  if (looks_like_kitti(text))
+    return KnownFile{"KITTI's poses, without times", "with its times.txt beside it `fbvins eval` reads it"};
   return std::nullopt;
 }
 

@@ -13,7 +13,8 @@ std::string no_pose_sentence(const std::map<std::string, int>& images_by_health)
   if (images == 0) return "no pose, as there is no image";
   const auto most = std::ranges::max_element(images_by_health, {}, [](const auto& of) { return of.second; });
   const std::string share = most->second == images ? "all" : fmt::format("{:.0f} %", 100.0 * most->second / images);
-  return fmt::format("no pose in any of {} images: health is {} in {} of them (docs/troubleshooting.md)", images, most->first, share);
+  return fmt::format("no pose in any of {} images: health is {} in {} of them (docs/troubleshooting.md)", images, most->first,
+                     share);
 }
 
 }  // namespace fbvins

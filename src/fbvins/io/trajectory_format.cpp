@@ -68,7 +68,8 @@ bool has_quaternion_first(const std::vector<std::vector<double>>& rows) {
 bool names_angles(std::string_view header) {
   std::string text(header);
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text.find("roll") != std::string::npos && text.find("pitch") != std::string::npos && text.find("yaw") != std::string::npos;
+  return text.find("roll") != std::string::npos && text.find("pitch") != std::string::npos &&
+         text.find("yaw") != std::string::npos;
 }
 
 constexpr double kTurn_rad = 6.3;
@@ -95,8 +96,7 @@ void describe(TrajectoryLayout& layout, bool usual_unit, bool assumed_order) {
   if (layout.stamp == 1) said.emplace_back("a running number before the stamp");
   if (!usual_unit) said.push_back(fmt::format("stamps in {}", name_of(layout.unit_ns)));
   if (layout.quaternion_first) said.emplace_back("the quaternion before the position, as OpenVINS' state_est.txt has it");
-  if (layout.angles)
-    said.push_back(fmt::format("roll, pitch and yaw in {}", layout.angle_rad == 1 ? "radians" : "degrees"));
+  if (layout.angles) said.push_back(fmt::format("roll, pitch and yaw in {}", layout.angle_rad == 1 ? "radians" : "degrees"));
   const bool usual_order = layout.angles || layout.w_first == (layout.separator != ' ');
   if (!usual_order) said.push_back(fmt::format("quaternions {}", layout.w_first ? "w x y z" : "x y z w"));
   const std::size_t known = layout.stamp + (layout.state ? kState : layout.velocity ? kPoseAndVelocity : kPose);
@@ -149,7 +149,8 @@ Result<TrajectoryLayout> recognise(const std::vector<CsvLine>& data, std::string
   layout.columns = counts[counts.size() / 2];
   layout.stamp = begins_with_number(rows) ? 1 : 0;
   if (looks_like_kitti(first))
-    return Error{ErrorCode::unsupported, fmt::format("{}: KITTI's poses, 12 numbers a row without a time: put its times.txt beside it", file)};
+    return Error{ErrorCode::unsupported,
+                 fmt::format("{}: KITTI's poses, 12 numbers a row without a time: put its times.txt beside it", file)};
   std::vector<double> stamps;
   for (const auto& row : rows)
     if (row.size() > layout.stamp && std::isfinite(row[layout.stamp])) stamps.push_back(row[layout.stamp]);
@@ -165,8 +166,10 @@ Result<TrajectoryLayout> recognise(const std::vector<CsvLine>& data, std::string
                   (names_angles(header) || (layout.separator == ' ' && largest_angle(rows) > kTurn_rad));
   if (layout.angles) layout.angle_rad = largest_angle(rows) > kTurn_rad ? std::numbers::pi / 180 : 1;
   if (layout.quaternion_first) layout.w_first = wanted.w_first.value_or(named.value_or(false));
-  layout.state = layout.separator != ' ' && layout.stamp == 0 && layout.columns >= kState && layout.w_first && !layout.quaternion_first;
-  layout.velocity = layout.separator != ' ' && layout.stamp == 0 && layout.columns == kPoseAndVelocity && !layout.quaternion_first;
+  layout.state =
+      layout.separator != ' ' && layout.stamp == 0 && layout.columns >= kState && layout.w_first && !layout.quaternion_first;
+  layout.velocity =
+      layout.separator != ' ' && layout.stamp == 0 && layout.columns == kPoseAndVelocity && !layout.quaternion_first;
   const bool usual = euroc ? layout.unit_ns == 1 : layout.separator == ' ' && layout.unit_ns == 1e9;
   describe(layout, usual, layout.separator != ' ' && !layout.w_first && !named && !wanted.w_first && layout.stamp == 0);
   return layout;

@@ -122,7 +122,8 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
   }
   out.counts.not_finite += nan_rows;
   if (nan_rows > 0 && out.counts.first_bad.empty()) out.counts.first_bad = fmt::format("{}: a value is not a usable number", file);
-  if (out.points.empty() && nan_rows == 0) return Error{ErrorCode::malformed, fmt::format("{}: {}", file, no_pose_sentence(health))};
+  if (out.points.empty() && nan_rows == 0)
+    return Error{ErrorCode::malformed, fmt::format("{}: {}", file, no_pose_sentence(health))};
   if (out.points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: no row has a pose", file)};
   return out;
 }
@@ -133,7 +134,8 @@ Result<TrajectoryFile> read_trajectory(const std::string& path, const Trajectory
   // Of a flight without a pose; the file beside it says why.
   const std::filesystem::path beside = std::filesystem::path(path).parent_path() / "trajectory.csv";
   std::error_code ignored;
-  if (data_lines(*text).empty() && std::filesystem::path(path).filename() != beside.filename() && std::filesystem::exists(beside, ignored)) {
+  if (data_lines(*text).empty() && std::filesystem::path(path).filename() != beside.filename() &&
+      std::filesystem::exists(beside, ignored)) {
     const Result<TrajectoryFile> whole = read_trajectory(beside.string());
     if (!whole) return whole.error();
   }

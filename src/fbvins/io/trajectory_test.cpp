@@ -213,7 +213,8 @@ TEST(Trajectory, RowsWithNaNAreCountedHoweverMany) {
 TEST(Trajectory, KittisPosesHaveNoTimes) {
   const auto file = parse_trajectory("1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n", "00.txt");
   ASSERT_FALSE(file.ok());
-  EXPECT_NE(file.error().message.find("00.txt: KITTI's poses, 12 numbers a row without a time"), std::string::npos) << file.error().message;
+  EXPECT_NE(file.error().message.find("00.txt: KITTI's poses, 12 numbers a row without a time"), std::string::npos)
+      << file.error().message;
 }
 
 TEST(Trajectory, KittisPosesWithTheirTimesBeside) {
@@ -242,7 +243,8 @@ TEST(Trajectory, KittisPosesWithTheirTimesBeside) {
 
 TEST(Trajectory, OpenVinsStateHasTheQuaternionFirst) {
   std::string text = "# timestamp(s) q p v bg ba cam_imu_dt num_cam cam0_k cam0_d cam0_rot cam0_trans\n";
-  for (int i = 0; i < 5; ++i) text += fmt::format("1403636624.{}63556 0.6 0 0 0.8 {} 2 3 0.1 0.2 0.3 0 0 0 0 0 0 0.0 2\n", i, 10 + i);
+  for (int i = 0; i < 5; ++i)
+    text += fmt::format("1403636624.{}63556 0.6 0 0 0.8 {} 2 3 0.1 0.2 0.3 0 0 0 0 0 0 0.0 2\n", i, 10 + i);
   const auto file = parse_trajectory(text, "state_est.txt");
   ASSERT_TRUE(file.ok()) << file.error().message;
   EXPECT_NE(file->recognised.find("the quaternion before the position"), std::string::npos) << file->recognised;
@@ -262,7 +264,9 @@ TEST(Trajectory, AnglesOnlyWhereTheFileSaysSoOrTheyCanBeNothingElse) {
   EXPECT_NEAR(radians->points[0].T_WB.q.z(), std::sin(0.75), 1e-12);
   EXPECT_TRUE(parse_trajectory("1.5 1 2 3 0 0 90\n2.5 1 2 3 0 0 -90\n", "a.txt").ok());
   EXPECT_FALSE(parse_trajectory("1.5 1 2 3 0 0 0.5\n2.5 1 2 3 0 0 0.6\n", "a.txt").ok()) << "a column is missing";
-  EXPECT_FALSE(parse_trajectory("1403636624463555584,0.1,0.2,0.3,8.1,0.2,-3\n1403636624468555584,0.1,0.2,0.3,8.1,0.2,-3\n", "imu.csv").ok());
+  EXPECT_FALSE(
+      parse_trajectory("1403636624463555584,0.1,0.2,0.3,8.1,0.2,-3\n1403636624468555584,0.1,0.2,0.3,8.1,0.2,-3\n", "imu.csv")
+          .ok());
 }
 
 TEST(Trajectory, OfAFlightWithoutAPoseHealthIsSaid) {
@@ -271,13 +275,15 @@ TEST(Trajectory, OfAFlightWithoutAPoseHealthIsSaid) {
   std::string row = ",nan";
   for (int i = 0; i < 36; ++i) row += ",nan";
   std::string text = "#timestamp\n";
-  for (int i = 0; i < 4; ++i) text += fmt::format("{}{},initialising,{},0\n", 1403636624463555584 + i * 50000000, row, i < 3 ? "imu_gap" : "few_tracks");
+  for (int i = 0; i < 4; ++i)
+    text += fmt::format("{}{},initialising,{},0\n", 1403636624463555584 + i * 50000000, row, i < 3 ? "imu_gap" : "few_tracks");
   std::ofstream(folder / "trajectory.csv") << text;
   std::ofstream(folder / "trajectory_tum.txt") << "";
   for (const char* name : {"trajectory.csv", "trajectory_tum.txt"}) {
     const auto file = read_trajectory((folder / name).string());
     ASSERT_FALSE(file.ok());
-    EXPECT_NE(file.error().message.find("no pose in any of 4 images: health is initialising/imu_gap in 75 % of them"), std::string::npos)
+    EXPECT_NE(file.error().message.find("no pose in any of 4 images: health is initialising/imu_gap in 75 % of them"),
+              std::string::npos)
         << file.error().message;
   }
   std::filesystem::remove_all(folder);

@@ -121,8 +121,8 @@ bool ClockGuard::go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const {
 }
 
 /// Puts the stamp a whole number of periods after the stream's newest one, by the time that has passed; or the other stream's
-/// correction, where that has jumped just now by about the same; or a counter's wrap; or the correction of before, where the clock
-/// jumped back.
+/// correction, where that has jumped just now by about the same; or a counter's wrap; or the correction of before, where the
+/// clock jumped back.
 Duration ClockGuard::correction_after_jump(Stream stream, Time raw, Time host) const {
   const State &s = states_[stream], &other = states_[1 - stream];
   const double passed_s = (host - *s.newest_host).seconds() * rate_;

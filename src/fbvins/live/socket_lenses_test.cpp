@@ -24,13 +24,14 @@ std::string refusal(const FbvinsSocketHello& hello) {
 }
 
 TEST(SocketLenses, EveryModelComesAsItWas) {
-  const LensModel models[] = {PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002},
-                              KannalaBrandt{40, 41, 31.5, 23.5, -0.025, 0.0625, 0.001, -0.002},
-                              DoubleSphere{40, 41, 31.5, 23.5, -0.25, 0.5},
-                              ExtendedUnified{40, 41, 31.5, 23.5, 0.5, 1.25},
-                              UnifiedRadtan{40, 41, 31.5, 23.5, 0.75, -0.25, 0.0625, 0.001, -0.002},
-                              PinholeRadtan5{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002, 0.015625},
-                              PinholeRational{40, 41, 31.5, 23.5, 0.25, -0.0625, 0.001, -0.002, 0.03125, 0.125, -0.0625, 0.0078125}};
+  const LensModel models[] = {
+      PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002},
+      KannalaBrandt{40, 41, 31.5, 23.5, -0.025, 0.0625, 0.001, -0.002},
+      DoubleSphere{40, 41, 31.5, 23.5, -0.25, 0.5},
+      ExtendedUnified{40, 41, 31.5, 23.5, 0.5, 1.25},
+      UnifiedRadtan{40, 41, 31.5, 23.5, 0.75, -0.25, 0.0625, 0.001, -0.002},
+      PinholeRadtan5{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002, 0.015625},
+      PinholeRational{40, 41, 31.5, 23.5, 0.25, -0.0625, 0.001, -0.002, 0.03125, 0.125, -0.0625, 0.0078125}};
   static_assert(std::size(models) == std::variant_size_v<LensModel>);
   for (const LensModel& model : models) {
     StereoRig rig = test::socket_test_rig();
@@ -55,8 +56,9 @@ TEST(SocketLenses, WhatIsMissingIsRefused) {
   rig.left = Camera(PinholeRadtan5{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002, 0.015625}, test::kWidth, test::kHeight);
   FbvinsSocketHello hello = hello_message(&rig);
   hello.flags &= ~std::uint32_t{FBVINS_SOCKET_HAS_LENSES};
-  EXPECT_EQ(refusal(hello),
-            "calibration: the left camera's model pinhole-radtan5 has 5 coefficients, which come in more_distortion, since version 1.8");
+  EXPECT_EQ(
+      refusal(hello),
+      "calibration: the left camera's model pinhole-radtan5 has 5 coefficients, which come in more_distortion, since version 1.8");
   hello = hello_message(&rig);
   hello.more_distortion[0][0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal(hello), "calibration: the left camera's intrinsics are not finite, with positive focal lengths");

@@ -35,9 +35,9 @@ struct Lens {
   std::size_t coefficients;
 };
 /// In the order of LensModel.
-constexpr Lens kLenses[] = {{FBVINS_SOCKET_RADTAN, "pinhole-radtan", 4},     {FBVINS_SOCKET_EQUIDISTANT, "pinhole-equidistant", 4},
-                            {FBVINS_SOCKET_DOUBLE_SPHERE, "ds", 2},          {FBVINS_SOCKET_EXTENDED_UNIFIED, "eucm", 2},
-                            {FBVINS_SOCKET_OMNI_RADTAN, "omni-radtan", 5},   {FBVINS_SOCKET_RADTAN5, "pinhole-radtan5", 5},
+constexpr Lens kLenses[] = {{FBVINS_SOCKET_RADTAN, "pinhole-radtan", 4},    {FBVINS_SOCKET_EQUIDISTANT, "pinhole-equidistant", 4},
+                            {FBVINS_SOCKET_DOUBLE_SPHERE, "ds", 2},         {FBVINS_SOCKET_EXTENDED_UNIFIED, "eucm", 2},
+                            {FBVINS_SOCKET_OMNI_RADTAN, "omni-radtan", 5},  {FBVINS_SOCKET_RADTAN5, "pinhole-radtan5", 5},
                             {FBVINS_SOCKET_RATIONAL, "pinhole-rational", 8}};
 static_assert(std::size(kLenses) == std::variant_size_v<LensModel>);
 
@@ -65,14 +65,16 @@ Result<Camera> camera_of(const SocketRig& sent, const FbvinsSocketCamera& c, std
 Mat3 matrix_of(const double (&m)[9]) { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m); }
 
 ImuIntrinsics axes_of(const FbvinsSocketImuAxes& sent) {
-  return {matrix_of(sent.gyro), matrix_of(sent.accel), matrix_of(sent.gyro_by_force),
+  return {matrix_of(sent.gyro),
+          matrix_of(sent.accel),
+          matrix_of(sent.gyro_by_force),
           {.gyro_radps = Vec3(sent.gyro_bias_radps), .accel_mps2 = Vec3(sent.accel_bias_mps2)}};
 }
 
 FbvinsSocketImuAxes axes_message(const ImuIntrinsics& axes) {
   FbvinsSocketImuAxes out{};
   using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const auto put = [](const Mat3& from, double (&to)[9]) { Eigen::Map<Rows>{to} = from; };
+  const auto put = [](const Mat3& from, double(&to)[9]) { Eigen::Map<Rows>{to} = from; };
   put(axes.gyro, out.gyro), put(axes.accel, out.accel), put(axes.gyro_by_force, out.gyro_by_force);
   Eigen::Map<Vec3>{out.gyro_bias_radps} = axes.bias.gyro_radps;
   Eigen::Map<Vec3>{out.accel_bias_mps2} = axes.bias.accel_mps2;
@@ -133,8 +135,8 @@ bool same(const SocketRig& a, const SocketRig& b) {
   const auto alike = [](const auto& x, const auto& y) { return std::memcmp(&x, &y, sizeof(x)) == 0; };
   const auto both = [&](const auto& x, const auto& y) { return x.has_value() == y.has_value() && (!x || alike(*x, *y)); };
   return a.cameras == b.cameras && alike(a.pair, b.pair) && alike(a.more, b.more) && both(a.depth, b.depth) &&
-         a.depth_width_px == b.depth_width_px && a.depth_height_px == b.depth_height_px && alike(a.depth_camera, b.depth_camera) &&
-         both(a.times, b.times) && both(a.lenses, b.lenses) && both(a.axes, b.axes);
+         a.depth_width_px == b.depth_width_px && a.depth_height_px == b.depth_height_px &&
+         alike(a.depth_camera, b.depth_camera) && both(a.times, b.times) && both(a.lenses, b.lenses) && both(a.axes, b.axes);
 }
 
 Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int height_px) {
@@ -151,7 +153,7 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
   }
   if (Result<void> good = check_figures(rig); !good) return good.error();
   ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
-                       rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
+                 rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
   if (sent.axes) noise.axes = axes_of(*sent.axes);
   const auto times = times_of(sent);
   if (!times) return times.error();

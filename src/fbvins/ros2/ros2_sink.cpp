@@ -120,8 +120,9 @@ Result<void> Ros2Sink::take(const LivePose& pose) {
   const bool after_reset = told_resets_ && *told_resets_ != pose.reset_counter;
   told_resets_ = pose.reset_counter;
   std::string message;
-  append_odometry(message, {t, at.T_WX.cast_frames<W, B>(), at.v_WX, at.w_WX_X, at.pose_covariance, at.velocity_covariance,
-                            R_base_B * rate_covariance_ * R_base_B.transpose(), options_.odometry_frame, base_frame(), after_reset});
+  append_odometry(message,
+                  {t, at.T_WX.cast_frames<W, B>(), at.v_WX, at.w_WX_X, at.pose_covariance, at.velocity_covariance,
+                   R_base_B * rate_covariance_ * R_base_B.transpose(), options_.odometry_frame, base_frame(), after_reset});
   if (Result<void> sent = odometry_.publish(std::move(message)); !sent) return sent;
   if (!options_.publish_tf || !due(transformed_, t, kTransformPeriod)) return {};
   const bool in_map = map_ && map_->reset_counter == pose.reset_counter;

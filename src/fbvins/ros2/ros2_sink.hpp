@@ -51,7 +51,7 @@ class Ros2Sink final : public Sink {
   std::optional<MapUpdate> map_;             // the newest, if T_MW is known
   Trajectory<W> way_;                        // the path of base_link, a pose every kPathStep_m
   std::uint32_t reset_counter_ = 0;          // of the path
-  std::optional<std::uint32_t> told_resets_; // of the last odometry message
+  std::optional<std::uint32_t> told_resets_;  // of the last odometry message
   std::optional<Time> transformed_, shown_;  // when the last of each was sent, in the messages' time
 };
 
