@@ -78,7 +78,7 @@ TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
   EXPECT_EQ(with([](auto& h) { h.right_offset_bytes = 0xfffff000u; }),
             "hello: 2 images of 3072 bytes, that of camera 1 at 4294963200, do not fit into a slot of 8192 bytes");
   EXPECT_EQ(with([](auto& h) { h.slots = 64, h.slot_bytes = 0x7fffffffu; }), "hello: 137438953408 bytes of images, over 1 GiB");
-  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1856 bytes says that it has 12");
+  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 2408 bytes says that it has 12");
   EXPECT_EQ(with([](auto& h) { std::memset(h.name, 0x1b, sizeof(h.name)); }), "taken");
 }
 
