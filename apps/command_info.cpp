@@ -150,7 +150,7 @@ std::optional<KnownFile> file_of(const std::string& path) {
 int show_file(const Arguments& arguments, const KnownFile& file) {
   const std::string& path = arguments.recording.path;
   if (arguments.json) fmt::print("{}\n", Json{{"file", path}, {"what", file.what}, {"use", file.use}}.dump(2));
-  else fmt::print("{}: this is {}: {}\n", bold(path), file.what, file.use);
+  else fmt::print("{}: {}; {}\n", bold(path), file.what, file.use);
   return kOk;
 }
 

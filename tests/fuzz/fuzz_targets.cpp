@@ -52,7 +52,12 @@ std::vector<std::string> calibration_seeds() {
 std::vector<std::string> trajectory_seeds() {
   return {
       test::toy_dataset().at("state_groundtruth_estimate0/data.csv"),
-      "# t x y z qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n1403636584.8 1.5 2 3 0.6 0 0 -0.8\n1403636585 1 1 1 0 0 0 1\n"};
+      "# t x y z qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n1403636584.8 1.5 2 3 0.6 0 0 -0.8\n1403636585 1 1 1 0 0 0 1\n",
+      "# timestamp(s) q p v bg ba cam_imu_dt\n1403636624.5 0.6 0 0 0.8 1 2 3 0 0 0 0 0 0 0 0 0 0\n1403636624.6 0.6 0 0 0.8 1 2 4 0 0 0 0 0 0 "
+      "0 0 0 0\n",
+      "#t x y z roll pitch yaw\n1.5 1 2 3 0 0 90\n2.5 1 2 3 0 0 -90\n",
+      "1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n",
+      "4294.9,1,2,3,1,0,0,0\n4294.95,1,2,3,1,0,0,0\n0.1,1,2,3,1,0,0,0\n0.2,1,2,3,1,0,0,0\n"};
 }
 
 std::vector<std::string> image_seeds() {

@@ -23,6 +23,7 @@
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
@@ -264,6 +265,20 @@ void find_tum_vi(const fs::path& folder, RecordingOptions& options) {
     options.imu_calibration = (folder / "dso/imu_config.yaml").string();
 }
 
+/// Of several IMUs in the file that one whose topic is used: by --topics, or as the bag has it alone.
+void choose_imu(const std::string& path, RecordingOptions& options) {
+  std::string& file = options.imu_calibration;
+  if (topics_of_imus(file).empty()) return;
+  std::vector<std::string> recorded = options.topics;
+  if (const auto bag = open_bag(path); bag && imu_of_topics(file, recorded) == file) {
+    (*bag)->only({}, {5'000'000'000});
+    while ((*bag)->next()) continue;
+    for (const BagTopic& topic : (*bag)->topics())
+      if (topic.type == "sensor_msgs/Imu") recorded.push_back(topic.name);
+  }
+  file = imu_of_topics(file, recorded);
+}
+
 /// Puts the calibration that is given with a recording into its options. Kalibr's is left to the recording's reader, which has
 /// noise figures to go with it.
 Result<void> take_calibration(bool bag, RecordingOptions& options) {
@@ -301,6 +316,7 @@ Result<std::unique_ptr<Dataset>> open_recording(const std::string& path, const R
   std::error_code ignored;
   const bool bag = is_bag(path);
   if (!bag && fs::is_directory(path, ignored)) find_tum_vi(path, options);
+  if (bag && !options.imu_calibration.empty()) choose_imu(path, options);
   if (Result<void> taken = take_calibration(bag, options); !taken) return taken.error();
   if (!bag) return open_dataset(path, options.dataset);
   auto reader = open_bag(path);

@@ -29,6 +29,30 @@ void doubt_times(const StereoRig& rig, int number, std::vector<std::string>& out
                     number, times.line_delay_s));
 }
 
+/// A focal length from that of the widest lens to a telescope's, in widths of the image; pixels that are twice as wide as high; a
+/// centre that far outside, in sizes of the image; a camera that far from the IMU.
+constexpr double kShortest = 0.05, kLongest = 20, kLargestAspect = 2, kOutside = 0.25, kFarthest_m = 5;
+
+void doubt_lens(const StereoRig& rig, int number, std::vector<std::string>& out) {
+  const Camera& camera = rig.camera(number);
+  const auto [fx, fy, cx, cy] = camera.intrinsics();
+  const double width = camera.width(), height = camera.height();
+  const auto doubt = [&](const std::string& what) { out.push_back(fmt::format("calibration: camera {}'s {}", number, what)); };
+  if (fx < kShortest * width || fx > kLongest * width)
+    doubt(fmt::format("focal length of {:g} px is hardly one of images of {:g} x {:g} pixels: is it in another unit?", fx, width,
+                      height));
+  else if (fx > kLargestAspect * fy || fy > kLargestAspect * fx)
+    doubt(fmt::format("focal lengths of {:g} and {:g} px differ by more than pixels do: is the order fx, fy, cx, cy?", fx, fy));
+  const auto outside = [](double centre, double size) { return centre < -kOutside * size || centre > (1 + kOutside) * size; };
+  if (outside(cx, width) || outside(cy, height))
+    doubt(fmt::format("centre ({:g}, {:g}) lies outside of its images of {:g} x {:g} pixels", cx, cy, width, height));
+  else if (cx < kOutside * width / 2 && cy < kOutside * height / 2)
+    doubt(fmt::format("centre ({:g}, {:g}) lies in a corner of its images of {:g} x {:g} pixels: are they cut, or is it a share?",
+                      cx, cy, width, height));
+  if (const double away_m = rig.T_BC(number).p.norm(); away_m > kFarthest_m)
+    doubt(fmt::format("place is {:g} m from the IMU: is it in millimetres?", away_m));
+}
+
 struct Figure {
   const char* name;
   double value, least, most;
@@ -38,6 +62,7 @@ struct Figure {
 
 std::vector<std::string> calibration_doubts(const StereoRig& rig) {
   std::vector<std::string> out;
+  for (int i = 0; i < rig.camera_count(); ++i) doubt_lens(rig, i, out);
   for (int i = 0; i < rig.camera_count(); ++i)
     if (i == 0 || rig.camera(i).own_times() != CameraTimes{}) doubt_times(rig, i, out);
   const ImuNoise& n = rig.imu_noise;

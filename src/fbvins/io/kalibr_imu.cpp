@@ -121,4 +121,23 @@ Result<StereoRig> with_imu_file(const StereoRig& rig, const std::string& name) {
   return with_imu_text(rig, path, *text, which);
 }
 
+std::vector<std::string> topics_of_imus(const std::string& path) {
+  const Result<std::string> text = read_file(path, kLargestYaml_bytes);
+  YamlReader yaml(path, text ? *text : "");
+  std::vector<std::string> out;
+  for (int i = 0; text && i < kMostImus; ++i) {
+    const std::string imu = fmt::format("imu{}", i);
+    if (!yaml.has(yaml.root(), imu)) break;
+    out.push_back(read_place(yaml, yaml.get(yaml.root(), imu), imu).topic);
+  }
+  return out.size() > 1 ? out : std::vector<std::string>{};
+}
+
+std::string imu_of_topics(const std::string& path, const std::vector<std::string>& recorded) {
+  const std::vector<std::string> topics = topics_of_imus(path);
+  const auto is_recorded = [&](const std::string& topic) { return std::ranges::find(recorded, topic) != recorded.end(); };
+  if (std::ranges::count_if(topics, is_recorded) != 1) return path;
+  return fmt::format("{}:imu{}", path, std::ranges::find_if(topics, is_recorded) - topics.begin());
+}
+
 }  // namespace fbvins

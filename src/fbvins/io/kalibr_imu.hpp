@@ -6,6 +6,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
@@ -18,5 +19,10 @@ namespace fbvins {
 Result<StereoRig> with_imu_file(const StereoRig& rig, const std::string& name);
 /// The same of a text. `which`: "imu1", or empty; `file` is only for messages.
 Result<StereoRig> with_imu_text(const StereoRig& rig, const std::string& file, const std::string& text, const std::string& which);
+
+/// The topics of imu0, imu1 ... of a file of several; empty of one, and where it cannot be read.
+std::vector<std::string> topics_of_imus(const std::string& path);
+/// The name with ":imuN" behind it where the topic of one of the file's IMUs alone is among those recorded; else as it is.
+std::string imu_of_topics(const std::string& path, const std::vector<std::string>& recorded);
 
 }  // namespace fbvins

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+#include <string>
+
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/foreign_files.hpp"
 
@@ -55,6 +59,17 @@ TEST(KalibrImu, OfSeveralOneIsNamed) {
   EXPECT_LT((with_imu_text(rig(), "imu.yaml", two, "imu1")->T_BC0.p - Vec3(0.5, -0.1, 0)).norm(), 1e-12);
   EXPECT_EQ(message(with_imu_text(rig(), "imu.yaml", two, "imu2")), "imu.yaml: imu2: is not there");
   EXPECT_NE(message(with_imu_file(rig(), "there/is/none.yaml:imu1")).find("there/is/none.yaml"), std::string::npos);
+}
+
+TEST(KalibrImu, OfSeveralTheOneWhoseTopicIsRecorded) {
+  const std::string path = (std::filesystem::path(::testing::TempDir()) / "fbvins_imus.yaml").string();
+  std::ofstream(path) << std::string("imu0:\n  rostopic: /a\n") + kHere + kNoise + "imu1:\n  rostopic: /b\n" + kTurned + kNoise;
+  EXPECT_EQ(imu_of_topics(path, {"/left", "/b"}), path + ":imu1");
+  EXPECT_EQ(imu_of_topics(path, {"/a"}), path + ":imu0");
+  EXPECT_EQ(imu_of_topics(path, {"/a", "/b"}), path) << "either may be meant";
+  EXPECT_EQ(imu_of_topics(path, {"/c"}), path);
+  EXPECT_EQ(imu_of_topics("there/is/none.yaml", {"/a"}), "there/is/none.yaml");
+  std::filesystem::remove(path);
 }
 
 TEST(KalibrImu, ImuUtilsHasTheAverageOfThreeAxes) {

@@ -40,7 +40,7 @@ constexpr const char
 constexpr Signature kSignatures[] = {
     {"FBVPLACE"sv, "a map", "give it by --load-map or --map; `fbvins map info` says what is in it"},
     {"FBVJOURN"sv, "the journal of a map", "it lies beside its map, and is read with that"},
-    {"FBVWORDS"sv, "a vocabulary of visual words", "give it by loop.vocabulary"},
+    {"FBVWORDS"sv, "a vocabulary of visual words", "the environment's FBVINS_VOCABULARY names it"},
     {"ULog\x01\x12\x35"sv, "a log of PX4", kFlightLog},
     {"\xA3\x95\x80"sv, "a log of ArduPilot's dataflash", kFlightLog},
     {"\x89PNG"sv, kImage, kNoRecording},
@@ -82,7 +82,8 @@ std::string span_of(const Rows& rows, const char* of) {
 std::optional<KnownFile> by_words(const std::string& path, const std::string& text) {
   if (text.find("ORB_SLAM") == std::string::npos && text.starts_with("10 6  0 0"))
     return KnownFile{"ORB-SLAM's vocabulary (DBoW2)", "this program has one of its own, which `fbvins vocab` trains"};
-  if (text.find("\"result\"") != std::string::npos && text.find("\"timing\"") != std::string::npos)
+  if (text.find("\"result\"") != std::string::npos &&
+      (text.find("\"timing\"") != std::string::npos || text.find("\"live\"") != std::string::npos))
     return KnownFile{"the summary of a run", "`fbvins report` shows the folder in which it lies"};
   if (text.starts_with("# camera ") || text.find("EKF2_") != std::string::npos)
     if (path.ends_with(".params"))
@@ -117,7 +118,7 @@ std::optional<KnownFile> known_file(const std::string& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
     if (!fs::exists(path + "/summary.json", ignored) || !fs::exists(path + "/trajectory.csv", ignored)) return std::nullopt;
-    return KnownFile{"the results of `fbvins run`", "`fbvins report` shows them, `fbvins eval` compares their trajectory"};
+    return KnownFile{"the results of a flight", "`fbvins report` shows them, `fbvins eval` compares their trajectory"};
   }
   if (!fs::is_regular_file(path, ignored)) return std::nullopt;
   const std::string text = beginning_of(path);
