@@ -182,23 +182,6 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
   return out;
 }
 
-JoinedClock continue_clock(BagContents& contents, const ChosenTopics& topics) {
-  std::vector<StampStream> streams;
-  std::vector<std::string> images = topics.cameras, readings;
-  if (!topics.depth.empty()) images.push_back(topics.depth);
-  for (const std::string& topic : {topics.imu, topics.accel})
-    if (!topic.empty()) readings.push_back(topic);
-  for (const std::string& topic : images) streams.push_back(stream_of(printable(topic), contents.images.at(topic).rows));
-  for (const std::string& topic : readings) streams.push_back(stream_of(printable(topic), contents.imu.at(topic).samples));
-  std::vector<StampStream*> all;
-  for (StampStream& stream : streams) all.push_back(&stream);
-  JoinedClock clock = join_clock(all);
-  for (std::size_t i = 0; i < images.size(); ++i) take_clock(streams[i], contents.images.at(images[i]).rows);
-  for (std::size_t i = 0; i < readings.size(); ++i) take_clock(streams[images.size() + i], contents.imu.at(readings[i]).samples);
-  follow_clock(clock, contents.ground_truth);
-  return clock;
-}
-
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics) {
   if (contents.rig.empty()) return std::nullopt;
   for (std::size_t i = 0; i < topics.cameras.size(); ++i)

@@ -12,7 +12,6 @@
 
 #include "fbvins/bags/bag_messages.hpp"
 #include "fbvins/bags/bag_reader.hpp"
-#include "fbvins/io/clock_steps.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/row_counts.hpp"
 
@@ -72,9 +71,6 @@ struct ChosenTopics {
   std::string accel;  ///< of a separate accelerometer: `imu` is the gyroscope's then; found by its name, never given
   std::string depth;  ///< images of a depth sensor, for one camera; empty: none
 };
-
-/// Continues the stamps on these topics, and of the ground truth, where their clock wrapped or stepped back (clock_steps.hpp).
-JoinedClock continue_clock(BagContents& contents, const ChosenTopics& topics);
 
 /// All of the calibration, noise figures included, where the bag has it for these topics; of cameras that are not among them,
 /// too.

@@ -26,6 +26,7 @@ class BagLoader : public FrameLoader {
     Camera camera;  ///< of a depth sensor: that whose pixels it has
     Encoding encoding;
     bool compressed;
+    enum Part { whole, left_half, right_half } part = whole;  ///< of messages with two images side by side
   };
   BagLoader(std::unique_ptr<BagReader> bag, std::string name, std::vector<Sensor> cameras, std::optional<Sensor> depth)
       : bag_(std::move(bag)), name_(std::move(name)), cameras_(std::move(cameras)), depth_(std::move(depth)) {}

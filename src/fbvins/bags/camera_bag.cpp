@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "fbvins/bags/bag_stamps.hpp"
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/topic_choice.hpp"

@@ -11,6 +11,7 @@
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/bag_loader.hpp"
+#include "fbvins/bags/bag_stamps.hpp"
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/camera/camera_times.hpp"
@@ -53,8 +54,10 @@ class BagRecording {
       bag->only(start - kImuLeadIn - kRecordingDelay, o.duration_s > 0 ? end + kRecordingDelay : kForever);
     }
     contents_ = read_contents(*bag, {}, options_.by_recording);
-    for (auto step : {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::continue_stamps,
-                      &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
+    bag_ = bag.get();
+    for (auto step :
+         {&BagRecording::choose, &BagRecording::check_stamps, &BagRecording::continue_stamps, &BagRecording::split_images,
+          &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
       if (Result<void> done = (this->*step)(); !done)
         return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
     describe_bag(*bag);
@@ -74,30 +77,27 @@ class BagRecording {
     return {};
   }
 
-  /// Header stamps of zero, which a driver that does not stamp leaves: an error where all are, else they are left out.
-  Result<void> check_stamps() {
-    const auto check = [&](const std::string& topic, auto& rows, const char* what) -> Result<void> {
-      const auto zero = std::erase_if(rows, [](const auto& row) { return row.t == Time{}; });
-      if (zero == 0) return {};
-      if (rows.empty())
-        return Error{ErrorCode::malformed, fmt::format("all {} {} on {} have a header stamp of zero: the driver does not stamp; "
-                                                       "--recording-time takes the times of recording", zero, what, topic)};
-      out_.info.warnings.push_back(fmt::format("{} of {} {} on {} have a header stamp of zero and are left out; --recording-time takes "
-                                               "the times of recording", zero, zero + rows.size(), what, topic));
-      return {};
-    };
-    for (const std::string& topic : topics_.cameras)
-      if (Result<void> good = check(topic, contents_.images.at(topic).rows, "images"); !good) return good;
-    for (const std::string& topic : {topics_.imu, topics_.accel})
-      if (const auto imu = contents_.imu.find(topic); imu != contents_.imu.end())
-        if (Result<void> good = check(topic, imu->second.samples, "readings"); !good) return good;
-    return {};
-  }
+  Result<void> check_stamps() { return leave_out_zero_stamps(contents_, topics_, out_.info.warnings); }
 
   Result<void> continue_stamps() {
     JoinedClock clock = continue_clock(contents_, topics_);
     for (std::string& sentence : clock.said) out_.info.warnings.push_back(fmt::format("{}: {}", path_, sentence));
     out_.info.clock_steps = std::move(clock.begins);
+    return {};
+  }
+
+  /// One topic of images that are twice as wide as those of a calibration of two cameras has both side by side.
+  Result<void> split_images() {
+    if (!rig_ || rig_->camera_count() != 2 || topics_.cameras.size() != 1 || !topics_.depth.empty()) return {};
+    const std::string topic = topics_.cameras.front();
+    const ImageTopic& images = contents_.images.at(topic);
+    if (images.rows.empty()) return {};
+    const auto first = image_of(bag_->read(place_of(images.rows.front().file)), images.encoding, images.compressed);
+    if (!first || first->width() != 2 * rig_->left.width() || first->height() != rig_->left.height()) return {};
+    side_by_side_ = true;
+    topics_.cameras.push_back(topic);
+    out_.info.warnings.push_back(
+        fmt::format("the images on {} are two side by side: the left half is camera 0, the right one camera 1", topic));
     return {};
   }
 
@@ -159,7 +159,7 @@ class BagRecording {
     ImageTopic& topic = contents_.images.at(name);
     info.rows.malformed += topic.malformed;
     info.rows.rows += topic.malformed;
-    std::vector<ImageRow> rows = in_order(std::move(topic.rows), info.rows);
+    std::vector<ImageRow> rows = in_order(side_by_side_ ? topic.rows : std::move(topic.rows), info.rows);
     info.listed += static_cast<int>(rows.size());
     return rows;
   }
@@ -222,8 +222,10 @@ class BagRecording {
       return BagLoader::Sensor{camera, images.encoding, images.compressed};
     };
     std::vector<BagLoader::Sensor> cameras;
-    for (const std::string& topic : topics_.cameras)
+    for (const std::string& topic : topics_.cameras) {
       cameras.push_back(sensor(topic, out_.rig.camera(static_cast<int>(cameras.size()))));
+      if (side_by_side_) cameras.back().part = cameras.size() == 1 ? BagLoader::Sensor::left_half : BagLoader::Sensor::right_half;
+    }
     std::optional<BagLoader::Sensor> depth;
     if (!topics_.depth.empty()) depth = sensor(topics_.depth, out_.rig.depth_camera());
     auto loader = std::make_unique<BagLoader>(std::move(bag), path_, std::move(cameras), std::move(depth));
@@ -239,6 +241,8 @@ class BagRecording {
   std::vector<std::string> rostopics_;  ///< of the cameras of a Kalibr chain that is given; empty without
   BagContents contents_;
   ChosenTopics topics_;
+  BagReader* bag_ = nullptr;        ///< while it is read
+  bool side_by_side_ = false;       ///< the one topic of images has those of both cameras
   bool named_ = false;              ///< topics of images are given, and not found
   bool whole_calibration_ = false;  ///< the bag's own, noise and rates included
   DatasetContents out_;

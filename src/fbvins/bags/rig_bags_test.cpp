@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 
 #include "fbvins/bags/depth_image.hpp"
 #include "fbvins/bags/recording.hpp"
@@ -122,6 +124,41 @@ TEST_F(RigBags, OneCameraIsARecording) {
   EXPECT_EQ(frames(*data).size(), 10u);
   ASSERT_EQ(data->info().warnings.size(), 1u);
   EXPECT_EQ(data->info().warnings.front().find("IMU: 20 readings a second"), 0u) << data->info().warnings.front();
+}
+
+TEST_F(RigBags, TwoImagesSideBySideAreThoseOfTwoCameras) {
+  StereoRig wide = rig_of_cameras(1);
+  const StereoRig two = rig_of_cameras(2);
+  const int width = two.left.width(), height = two.left.height();
+  wide.left = Camera(PinholeRadtan{90, 91, 40, 30, 0, 0, 0, 0}, 2 * width, height);
+  auto bag = Ros1BagWriter::create(path(), wide, Time{1'000'000'000});
+  ASSERT_TRUE(bag) << bag.error().message;
+  for (std::int64_t i = 0; i < 60; ++i) {
+    const Time t{1'000'000'000 + 5'000'000 * i};
+    ASSERT_TRUE(bag->add(ImuSample{t, Vec3::Zero(), Vec3(0, 0, 9.81)}));
+    if (i % 10 != 5) continue;
+    auto both = std::make_shared<Image>(2 * width, height, std::uint8_t{10});
+    for (int y = 0; y < height; ++y)
+      for (int x = width; x < 2 * width; ++x) both->at(x, y) = 200;
+    ASSERT_TRUE(bag->add(StereoFrame{t, both, nullptr}));
+  }
+  ASSERT_TRUE(bag->finish());
+  const auto data = open({.dataset = {.rig = two}});
+  ASSERT_TRUE(data);
+  EXPECT_TRUE(data->rig().has_right());
+  const auto said = [](const std::string& w) { return w.find("are two side by side") != w.npos; };
+  EXPECT_EQ(std::ranges::count_if(data->info().warnings, said), 1);
+  int frames = 0;
+  while (auto event = data->next()) {
+    const auto* frame = std::get_if<StereoFrame>(&*event);
+    if (!frame) continue;
+    ++frames;
+    ASSERT_TRUE(frame->left && frame->right);
+    EXPECT_EQ(frame->left->width(), width);
+    EXPECT_EQ(frame->left->at(width - 1, 3), 10);
+    EXPECT_EQ(frame->right->at(0, 3), 200);
+  }
+  EXPECT_EQ(frames, 6);
 }
 
 TEST_F(RigBags, DepthImagesAreOfTheCamera) {
