@@ -186,7 +186,7 @@ const Skipped kSkipped[] = {
          l[5] = l[4];
        });
      },
-     "20/20/20/221; truth: 2 malformed 1 not finite, first line 4"},
+     "20/20/20/221; truth: 2 malformed 1 not finite, first line 5"},
 };
 
 class SkippedDataset : public testing::TestWithParam<Skipped> {};

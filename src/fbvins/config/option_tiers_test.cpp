@@ -29,7 +29,7 @@ TEST(OptionTiers, ThereAreFewEnoughToRead) {
   Config config;
   EXPECT_LE(user_options().size(), 16u);
   EXPECT_LE(values_of(fields_of(config)).size(),
-            88u);  // seventeen for a flight controller, nine of names, clock, commands and quality of service for ROS 2
+            89u);  // seventeen for a flight controller, ten of names, clock, transforms, commands and quality of service for ROS 2
 }
 
 TEST(OptionTiers, AGroupIsShownOnlyWithAUserOption) {

@@ -110,7 +110,7 @@ TEST(MotionCapture, PlainTrajectoriesAreRead) {
   ASSERT_TRUE(tum.ok());
   EXPECT_EQ(tum->format, "TUM");
   EXPECT_EQ(tum->bodies[0].track[1].t, Time{1'600'000'000});
-  const auto euroc = parse_motion_capture("#timestamp [ns],p,p,p,q,q,q,q\n1500000000,1,2,3,1,0,0,0\n", "data.csv");
+  const auto euroc = parse_motion_capture("#timestamp [ns],p,p,p,q,q,q,q\n1403636580838555648,1,2,3,1,0,0,0\n", "data.csv");
   ASSERT_TRUE(euroc.ok());
   EXPECT_EQ(euroc->format, "EuRoC CSV");
   EXPECT_EQ(euroc->bodies[0].track[0].T_VK.p, Vec3(1, 2, 3));
