@@ -22,6 +22,8 @@ constexpr Duration kLeastStep{100'000'000};
 constexpr std::size_t kRows = 4;
 /// Of the times that a step goes back to, at least this share is taken, unless rows merely came late.
 constexpr double kTaken = 0.7;
+/// Rows before a step that are looked at; steps of a clock that is one.
+constexpr std::size_t kLooked = 20'000, kMostSteps = 100;
 /// Streams of one clock step back by the same, but for their periods.
 constexpr Duration kSameStep{100'000'000};
 
@@ -39,12 +41,20 @@ bool go_on(const std::vector<Time>& stamps, std::size_t from, std::size_t to, Du
   return true;
 }
 
-/// Whether the rows [part, i) have stamps where those from i on go again.
+/// Whether the rows [part, i), of which those of the last minutes are looked at, have stamps where those from i on go again.
 bool times_are_taken(const std::vector<Time>& stamps, std::size_t part, std::size_t i, Duration interval) {
-  const Time from = std::max(stamps[i], stamps[part]), to = stamps[i - 1];
-  const auto here = std::count_if(stamps.begin() + static_cast<std::ptrdiff_t>(part),
+  const std::size_t begin = std::max(part, i > kLooked ? i - kLooked : 0);
+  const Time from = std::max(stamps[i], stamps[begin]), to = stamps[i - 1];
+  const auto here = std::count_if(stamps.begin() + static_cast<std::ptrdiff_t>(begin),
                                   stamps.begin() + static_cast<std::ptrdiff_t>(i), [&](Time t) { return t >= from && t <= to; });
   return static_cast<double>(here) >= kTaken * (1 + static_cast<double>((to - from).ns) / static_cast<double>(interval.ns));
+}
+
+/// Whether the rows from i on leap ahead to where the stamps before were: a block that came late.
+bool leap_ahead(const std::vector<Time>& stamps, std::size_t i, Duration longest) {
+  std::size_t k = i + 1;
+  while (k < stamps.size() && stamps[k] <= stamps[i - 1] && stamps[k] > stamps[k - 1]) ++k;
+  return k < stamps.size() && stamps[k] > stamps[i - 1] && stamps[k] - stamps[k - 1] > longest;
 }
 
 std::size_t first_of_part(const StampStream& s, std::size_t k) { return k == 0 ? 0 : s.steps[k - 1]; }
@@ -155,7 +165,8 @@ std::vector<std::size_t> clock_steps(const std::vector<Time>& stamps) {
   for (std::size_t i = kRows; i + kRows <= stamps.size(); ++i) {
     if (stamps[i] >= stamps[i - 1] || (stamps[i - 1] - stamps[i] + interval) < kLeastStep) continue;
     if (i < part + kRows || !go_on(stamps, i - kRows, i, longest) || !go_on(stamps, i, i + kRows, longest)) continue;
-    if (!times_are_taken(stamps, part, i, interval)) continue;
+    if (!times_are_taken(stamps, part, i, interval) || leap_ahead(stamps, i, longest)) continue;
+    if (out.size() == kMostSteps) return {};
     out.push_back(i);
     part = i;
   }

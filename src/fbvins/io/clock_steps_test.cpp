@@ -50,6 +50,17 @@ TEST(ClockSteps, WrongAndLateRowsAreNone) {
   EXPECT_TRUE(clock_steps({Time{5}}).empty());
 }
 
+/// In a time that does not grow with the square of their number.
+TEST(ClockSteps, StampsThatFollowNoClockHaveNone) {
+  std::vector<Time> teeth, holes;
+  for (int i = 0; i < 400'000; ++i) {
+    teeth.push_back(Time{(i % 8) * 50 * kMs});
+    holes.push_back(Time{(i / 8 * 800 + (i / 8 % 2 == 0 ? 800 : -800) + i % 8 * 50) * kMs});
+  }
+  EXPECT_TRUE(clock_steps(teeth).empty());
+  EXPECT_TRUE(clock_steps(holes).empty());
+}
+
 TEST(ClockSteps, StreamsAreContinuedTogether) {
   StampStream images{"images", stamps(200, 50, 100, 1000)}, imu{"imu", stamps(2000, 5, 1003, 1000)}, none{"none", {}};
   const JoinedClock clock = join_clock({&images, &imu, &none});
