@@ -103,9 +103,11 @@ class PlayedRecording {
 /// Writes the corrected calibration; `corrected` loses its rig where the file would not be read back.
 Result<void> write_calibration(CorrectedRig& corrected, const std::string& file) {
   const std::string text = to_kalibr_rig(rig_calibration(*corrected.rig));
-  if (Result<StereoRig> read = parse_kalibr_camchain({file, text}); !read) {
+  const Result<StereoRig> cameras = parse_kalibr_camchain({file, text});
+  const Result<ImuNoise> imu = parse_imu({file, text});
+  if (!cameras || !imu) {
     corrected.rig.reset();
-    corrected.why_not = read.error().message;
+    corrected.why_not = (cameras ? imu.error() : cameras.error()).message;
     return {};
   }
   return write_file_atomically(file, text);

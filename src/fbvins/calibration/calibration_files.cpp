@@ -160,7 +160,8 @@ std::string to_kalibr_imu(const ImuNoise& noise) {
 std::string to_kalibr_rig(const RigCalibration& rig) {
   std::string imu = "imu0:\n";
   const std::string figures = to_kalibr_imu(rig.imu_noise);
-  for (const CsvLine& line : lines_of(figures)) imu += fmt::format("  {}\n", line.text);
+  for (std::size_t at = 0; at < figures.size(); at = figures.find('\n', at) + 1)
+    imu += "  " + figures.substr(at, figures.find('\n', at) + 1 - at);  // with its own indentation
   return to_kalibr_camchain(rig) + imu;
 }
 

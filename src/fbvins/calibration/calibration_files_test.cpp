@@ -42,6 +42,7 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   rig.imu_noise = {1.5e-3, 2.5e-2, 3.5e-5, 4.5e-3, 400, 8, 80};
   rig.time_offset_s = -0.0123, rig.line_delay_s = 3e-5;
   rig.right.set_own_times({0.002, 1e-5});
+  rig.imu_noise.axes.gyro(0, 0) = 1.0078125, rig.imu_noise.axes.accel(2, 1) = 0.015625;
   const std::string text = to_kalibr_rig(rig_calibration(rig));
   const auto read = parse_kalibr_camchain({"fixed.yaml", text});
   ASSERT_TRUE(read) << read.error().message;
@@ -55,6 +56,7 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   EXPECT_EQ(noise->gyro_noise_density_radps_rthz, 1.5e-3);
   EXPECT_EQ(noise->accel_random_walk_mps3_rthz, 4.5e-3);
   EXPECT_EQ(noise->rate_hz, 400);
+  EXPECT_LT((noise->axes.gyro - rig.imu_noise.axes.gyro).norm() + (noise->axes.accel - rig.imu_noise.axes.accel).norm(), 1e-12);
   EXPECT_EQ(noise->max_gyro_radps, 8);
   EXPECT_EQ(noise->max_accel_mps2, 80);
 }

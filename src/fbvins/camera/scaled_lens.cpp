@@ -41,4 +41,20 @@ std::optional<Camera> scaled_to(const Camera& camera, int width, int height) {
   return out;
 }
 
+std::optional<Camera> middle_of(const Camera& camera, int width, int height) {
+  const int left = camera.width() - width, top = camera.height() - height;  // twice what is cut there
+  if (left < 0 || top < 0 || left + top == 0 || 2 * width < camera.width() || 2 * height < camera.height()) return std::nullopt;
+  LensModel model = camera.model();
+  std::visit([&](auto& m) { m.cx -= 0.5 * left, m.cy -= 0.5 * top; }, model);
+  Camera out(model, width, height);
+  if (camera.mask()) {
+    Image seen(width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) seen.at(x, y) = camera.mask()->hides(Vec2(x + left / 2, y + top / 2)) ? 0 : 255;
+    out.set_mask(std::make_shared<const Mask>(seen));
+  }
+  out.set_own_times(camera.own_times());
+  return out;
+}
+
 }  // namespace fbvins

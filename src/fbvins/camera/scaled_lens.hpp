@@ -18,4 +18,8 @@ Camera with_scaled_lens(const Camera& camera, double factor);
 /// factor, to a pixel: such an image was cut out or squeezed.
 std::optional<Camera> scaled_to(const Camera& camera, int width, int height);
 
+/// The camera with images that are the middle of its own, and its mask cut likewise. None where they are larger, or less than
+/// half as wide or as high.
+std::optional<Camera> middle_of(const Camera& camera, int width, int height);
+
 }  // namespace fbvins

@@ -29,6 +29,22 @@ TEST(ScaledLens, IsNoneOfAnImageOfAnotherShape) {
   EXPECT_TRUE(scaled_to(camera(), 250, 160)) << "a third, rounded";
 }
 
+TEST(ScaledLens, TheMiddleSeesTheSame) {
+  const auto cut = middle_of(camera(), 640, 400);
+  ASSERT_TRUE(cut);
+  const Vec3 p(0.3, -0.1, 2);
+  EXPECT_LT((*cut->project(p) - (*camera().project(p) - Vec2(56, 40))).norm(), 1e-9);
+  EXPECT_FALSE(middle_of(camera(), 752, 480)) << "all of it";
+  EXPECT_FALSE(middle_of(camera(), 800, 480));
+  EXPECT_FALSE(middle_of(camera(), 300, 480)) << "that would be another camera's";
+  Camera masked = camera();
+  Image seen(752, 480, 255);
+  hide(seen, MaskRectangle{0, 440, 752, 40});
+  masked.set_mask(std::make_shared<const Mask>(seen));
+  EXPECT_FALSE(middle_of(masked, 640, 400)->hidden({100, 398}, 0));
+  EXPECT_TRUE(middle_of(masked, 640, 440)->hidden({100, 421}, 0));
+}
+
 TEST(ScaledLens, TakesItsMaskAlong) {
   Camera masked = camera();
   Image seen(752, 480, 255);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "fbvins/doctor/common_mistakes.hpp"
@@ -123,6 +124,10 @@ void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, 
   finding.size = static_cast<double>(scaled.front().images.width) / scaled.front().calibrated.width;
   finding.unit = "times the calibration's size";
   std::string cameras;
+  const auto is_cut = [](const ScaledLens& lens) {
+    const double factor = static_cast<double>(lens.images.width) / lens.calibrated.width;
+    return std::abs(factor * lens.calibrated.height - lens.images.height) > std::max(1.0, factor);
+  };
   const ScaledLens* before = nullptr;
   for (const ScaledLens& lens : scaled) {
     cameras += fmt::format("{}cam{}", cameras.empty() ? "" : ", ", lens.camera);
@@ -138,6 +143,10 @@ void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, 
   finding.expected += " by the calibration";
   finding.advice =
       "calibrate at the size that is used, or scale focal lengths and centres: all else was judged with lenses scaled so";
+  if (std::ranges::any_of(scaled, is_cut))
+    finding.advice =
+        "calibrate at the size that is used, or take from the centres what was cut off at the left and at the top: all else was judged as "
+        "if the images were the middle of the calibrated ones; where they were cut elsewhere, it is seen as their principal point";
   const bool is_pair = found.rig.camera_count() == 2;
   if (!is_pair) finding.fields.clear();  // lines name a pair's cameras
   found.findings.insert(found.findings.begin(), std::move(finding));

@@ -71,7 +71,8 @@ std::optional<ScaledRig> scaled_to_images(const DatasetContents& contents) {
     cameras.push_back(contents.rig.mounted(i));
     const std::optional<ImageSize> size = other_size_of(contents, i);
     if (!size) continue;
-    const std::optional<Camera> scaled = scaled_to(cameras.back().camera, size->width, size->height);
+    std::optional<Camera> scaled = scaled_to(cameras.back().camera, size->width, size->height);
+    if (!scaled) scaled = middle_of(cameras.back().camera, size->width, size->height);
     if (!scaled) return std::nullopt;
     out.cameras.push_back({i, {cameras.back().camera.width(), cameras.back().camera.height()}, *size});
     cameras.back().camera = *scaled;
@@ -96,7 +97,8 @@ Result<void> check_images(const DatasetContents& contents) {
   for (int i = 0; i < contents.rig.camera_count(); ++i)
     if (Result<void> good = check_camera(contents, i); !good) {
       const bool scales = scaled_to_images(contents).has_value();
-      return Error{good.error().code, good.error().message + (scales ? "; `fbvins doctor --fix` scales a calibration" : "")};
+      return Error{good.error().code,
+                   good.error().message + (scales ? "; `fbvins doctor --fix` scales or cuts a calibration" : "")};
     }
   return check_sensor(
       contents, "depth", [](const FrameEntry& f) { return f.depth_file; },
