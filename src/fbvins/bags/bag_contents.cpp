@@ -10,10 +10,13 @@
 #include <deque>
 #include <utility>
 
+#include "fbvins/bags/foreign_calibration.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/csv.hpp"
+#include "fbvins/io/file_source.hpp"
 #include "fbvins/io/quoted.hpp"
 #include "fbvins/io/rig_text.hpp"
 
@@ -47,6 +50,11 @@ void take_imu(const BagMessage& message, const BagTopic& about, std::optional<Ti
 void take_image(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, ImageTopic& topic) {
   topic.compressed = about.type == "sensor_msgs/CompressedImage";
   topic.encoding = about.encoding;
+  if (topic.rows.empty()) {
+    MessageFields in(message.data, about.encoding);
+    in.header();
+    topic.frame = in.frame();
+  }
   const std::optional<Time> t = stamp_of(message.data, about.encoding);
   if (t) topic.rows.push_back({recorded.value_or(*t), place_name(message.place)});
   else ++topic.malformed;
@@ -189,6 +197,35 @@ std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const Chos
   Result<StereoRig> rig = parse_rig(contents.rig, std::string(kRigTopic));
   if (rig && std::cmp_less(rig->camera_count(), topics.cameras.size())) return std::nullopt;
   return rig;
+}
+
+Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topics, BagContents& contents) {
+  std::vector<std::string_view> files;
+  split_at_commas(paths, files);
+  if (files.size() != topics.cameras.size())
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("{}: {} camera_info files for {} cameras", paths, files.size(), topics.cameras.size())};
+  std::vector<BagCamera> cameras;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const std::string file(files[i]);
+    const Result<std::string> text = read_file(file, kLargestYaml_bytes);
+    if (!text) return text.error();
+    Result<BagCamera> camera = parse_camera_info_file({file, *text});
+    if (!camera) return camera.error();
+    std::string topic = topics.cameras[i];
+    camera->frame = contents.images.at(topic).frame;
+    if (topic.ends_with("/compressed")) topic.erase(topic.rfind('/'));
+    contents.cameras.insert_or_assign(topic + "/camera_info", *camera);
+    cameras.push_back(*std::move(camera));
+  }
+  if (cameras.size() != 2 || !cameras[0].rectified || !cameras[1].rectified || cameras[0].frame == cameras[1].frame ||
+      find_transform(contents.transforms, cameras[0].frame, cameras[1].frame))
+    return {};
+  const auto &first = *cameras[0].rectified, &second = *cameras[1].rectified;
+  const Pose<B, B> T(Quat(first.R_rectified_raw.transpose() * second.R_rectified_raw),
+                     Vec3(first.R_rectified_raw.transpose() * Vec3(second.x_m - first.x_m, 0, 0)));
+  contents.transforms.push_back({cameras[0].frame, cameras[1].frame, T.q, T.p});
+  return {};
 }
 
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {

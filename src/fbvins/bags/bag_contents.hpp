@@ -25,6 +25,7 @@ struct ImuTopic {
 
 struct ImageTopic {
   std::vector<ImageRow> rows;  ///< in recorded order; `file` is the message's place
+  std::string frame;
   bool compressed = false;
   Encoding encoding = Encoding::ros1;
   int malformed = 0;
@@ -75,6 +76,9 @@ struct ChosenTopics {
 /// All of the calibration, noise figures included, where the bag has it for these topics; of cameras that are not among them,
 /// too.
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics);
+/// Takes camera_info files, a camera each in the order of the topics, instead of the bag's messages. Where the bag does not know
+/// the place of the second camera, it is that of the files' R and P.
+Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topics, BagContents& contents);
 /// From camera_info and transforms: K and D of raw images, R and P of topics that are called rectified. The error says what is
 /// missing.
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics);

@@ -3,14 +3,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "fbvins/bags/foreign_calibration.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/csv.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
@@ -136,6 +139,15 @@ std::string calibration_format(const std::string& text) {
 bool is_kalibr(const std::string& path) {
   const Result<std::string> text = read_file(path, kLargestYaml_bytes);
   return text && calibration_format(*text) == "Kalibr";
+}
+
+bool is_camera_info(const std::string& paths) {
+  std::vector<std::string_view> files;
+  split_at_commas(paths, files);
+  return std::ranges::all_of(files, [](std::string_view file) {
+    const Result<std::string> text = read_file(std::string(file), kLargestYaml_bytes);
+    return text && calibration_format(*text) == "camera_info";
+  });
 }
 
 Result<StereoRig> load_calibration(const std::string& path, const std::string& imu_path) {

@@ -30,5 +30,7 @@ Result<StereoRig> load_camera_info(const std::string& left_path, const std::stri
 /// "camera_info"; empty for none.
 std::string calibration_format(const std::string& text);
 bool is_kalibr(const std::string& path);
+/// Whether it is a camera_info file of ROS, or several with commas between, a camera each.
+bool is_camera_info(const std::string& paths);
 
 }  // namespace fbvins

@@ -29,7 +29,9 @@ std::string bag_with(const std::string& name, const std::function<std::int64_t(s
   const auto image = std::make_shared<const Image>(80, 60, std::uint8_t{90});
   for (std::int64_t ms = 0; ms < 4000; ms += 5) {
     EXPECT_TRUE(bag->add(ImuSample{Time{stamp(ms)}, Vec3(0.001 * static_cast<double>(ms), 0, 0), Vec3(0, 0, 9.81)}).ok());
-    if (ms % 50 == 25) EXPECT_TRUE(bag->add(StereoFrame{Time{image_stamp(ms)}, image, image}).ok());
+    if (ms % 50 == 25) {
+      EXPECT_TRUE(bag->add(StereoFrame{Time{image_stamp(ms)}, image, image}).ok());
+    }
   }
   EXPECT_TRUE(bag->finish().ok());
   return path;

@@ -150,6 +150,7 @@ struct RosCamera {
   Camera camera;
   Mat3 rectification = Mat3::Identity();
   double shift_m = 0;  ///< of the rectified camera along x, as its projection has it
+  std::array<double, 4> projection{};
 };
 
 RosCamera ros_camera(YamlReader& yaml) {
@@ -179,6 +180,7 @@ RosCamera ros_camera(YamlReader& yaml) {
   out.camera = *camera;
   out.rectification << R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8];
   out.shift_m = P[3] / P[0];
+  out.projection = {P[0], P[5], P[2], P[6]};
   return out;
 }
 
@@ -267,6 +269,18 @@ Error camera_info_alone(YamlReader yaml) {
               "[{}, {}]",
               yaml.file(), k.model, yaml_list(k.intrinsics), k.distortion, yaml_list(k.coefficients), ros.camera.width(),
               ros.camera.height())};
+}
+
+Result<BagCamera> parse_camera_info_file(YamlReader yaml) {
+  const RosCamera ros = ros_camera(yaml);
+  if (!yaml.ok()) return yaml.error();
+  const auto [fx, fy, cx, cy] = ros.projection;
+  const bool rotates = (ros.rectification.transpose() * ros.rectification - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3;
+  BagCamera out{ros.camera, ""};
+  if (rotates && fx > 0 && fy > 0)
+    out.rectified = {Camera(PinholeRadtan{fx, fy, cx, cy}, ros.camera.width(), ros.camera.height()), ros.rectification,
+                     -ros.shift_m};
+  return out;
 }
 
 Result<StereoRig> parse_kimera(std::vector<YamlReader> files, std::optional<YamlReader> imu_file) {

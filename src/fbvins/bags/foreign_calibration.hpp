@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "fbvins/bags/bag_messages.hpp"
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/mask_fields.hpp"
@@ -38,6 +39,9 @@ Result<StereoRig> parse_oak(YamlReader yaml);
 
 /// What a camera_info file says, and what it lacks for a calibration of a camera and an IMU: always an error.
 Error camera_info_alone(YamlReader yaml);
+
+/// One camera of it, without its place; rectified as the file's R and P say.
+Result<BagCamera> parse_camera_info_file(YamlReader yaml);
 
 /// camera_info as camera_calibration writes it: C1 against C0 comes from rectification and projection.
 Result<StereoRig> parse_camera_info(YamlReader left, YamlReader right, const Pose<B, C0>& T_BC0);

@@ -102,20 +102,22 @@ class BagRecording {
   }
 
   Result<void> calibrate() {
-    if (const auto own = own_rig(contents_, topics_); !rig_ && own) {
+    if (const auto own = own_rig(contents_, topics_); !rig_ && own && options_.calibration.empty()) {
       if (!*own) return own->error();
       rig_ = **own;
       whole_calibration_ = true;
     }
     if (!rig_) {
       if (!named_) topics_.cameras = calibrated_cameras(contents_, topics_);
+      if (!options_.calibration.empty())
+        if (Result<void> taken = take_camera_info(options_.calibration, topics_, contents_); !taken) return taken;
       const Result<StereoRig> rig = rig_of(contents_, topics_);
       if (!rig) return rig.error();
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
       if (std::string said = rectified_topics(contents_, topics_); !said.empty()) out_.info.warnings.push_back(std::move(said));
     }
-    if (const std::string& imu = options_.dataset.kalibr_imu; !imu.empty() && options_.calibration.empty()) {
+    if (const std::string& imu = options_.dataset.kalibr_imu; !imu.empty()) {
       const Result<ImuNoise> given = load_imu(imu, rig_->imu_noise);
       if (!given) return given.error();
       rig_->imu_noise = *given;
@@ -288,6 +290,10 @@ void choose_imu(const std::string& path, RecordingOptions& options) {
 Result<void> take_calibration(bool bag, RecordingOptions& options) {
   if (options.calibration.empty()) {
     options.dataset.kalibr_imu = options.imu_calibration;  // with the recording's own cameras
+    return {};
+  }
+  if (bag && is_camera_info(options.calibration)) {  // with the places that the bag has
+    options.dataset.kalibr_imu = options.imu_calibration;
     return {};
   }
   const Result<StereoRig> rig = load_calibration(options.calibration, options.imu_calibration);

@@ -17,7 +17,9 @@ std::string what(const std::string& name, const std::string& content) {
   std::ofstream(path, std::ios::binary) << content;
   const auto known = known_file(path);
   std::filesystem::remove_all(folder);
-  if (known) EXPECT_FALSE(known->use.empty());
+  if (known) {
+    EXPECT_FALSE(known->use.empty());
+  }
   return known ? known->what : "";
 }
 
