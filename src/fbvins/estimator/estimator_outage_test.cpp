@@ -229,7 +229,7 @@ TEST(Estimator, AGoodImuCarriesThePoseForLongerThanABadOne) {
       EXPECT_LT(flown.position_error(k), 0.02 + 3 * worst_sigma_m(flown.odometry[k].pose_covariance)) << k;
     }
   }
-  EXPECT_GT(carried[true], 80) << "four seconds";
+  EXPECT_GT(carried[true], 100) << "five seconds";
   EXPECT_LT(carried[false], 60) << "three";
 }
 

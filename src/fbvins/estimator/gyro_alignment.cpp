@@ -17,21 +17,26 @@ namespace {
 /// Images so far apart are compared: an offset shows by the change of the rate between them.
 constexpr double kApart_s = 0.09;
 constexpr double kMostApart_s = 0.3;
-constexpr std::size_t kMostPairs = 150, kMostPlanes = 40, kFewestPlanes = 12;
+constexpr std::size_t kMostPairs = 150, kMostTracks = 40, kFewestTracks = 12;
 /// Of a rate by orientations, to both sides: above the vibration of an airframe, below its motion.
 constexpr Duration kRateOver{8'000'000};
 constexpr Duration kMargin = Duration{static_cast<std::int64_t>(1e9 * GyroAlignment::kLargestOffset_s)} + kRateOver;
-constexpr int kIterations = 6;
+/// Full steps swing to and fro: the tracks' weights follow the directions of parallax, which follow the unknowns.
+constexpr int kIterations = 10;
+constexpr double kShare = 0.6;
+constexpr double kLeastStep_s = 2e-5, kLeastStep_radps = 1e-4;
 constexpr double kHuber_sigmas = 2;
-/// A track nearer to the direction of the translation than this angle counts as if it were as far, rad.
-constexpr double kEpipole = 0.1;
+/// What is assumed of parallax: that of each track differs from the mean by so many times the mean, which is more than in any room, so that
+/// the mean counts only where parallax is small; none is larger than the second, rad.
+constexpr double kDepths = 3, kMostParallax = 0.5;
+constexpr int kParallaxIterations = 4;
 /// Offsets from which the search begins: closer together than a quarter of the fastest motion of a hand, 5 Hz.
 constexpr double kStarts_s[] = {0, -0.04, 0.04, -0.08, 0.08};
 /// From here on the minimum is known.
 constexpr double kSettled_s = 0.002;
 /// The tracks of two images share what is left of the readings' noise and of the lens: the covariance of independent ones is too
 /// small by this factor (docs/experiments/sensors.md).
-constexpr double kShared = 4;
+constexpr double kShared = 2;
 /// And residuals of real tracks are so small a part of what a track's standard deviation allows, at least.
 constexpr double kLeastRms = 0.4;
 /// A pair shows when its image was taken where its tracks say it to this, alone. Where nothing is wrong, pairs of real images are off by
@@ -41,12 +46,119 @@ constexpr std::size_t kFewestLate = 10;
 
 using Vec8 = GyroAlignmentEstimate::Vec;
 
-/// Of each stamp, by what the pairs are off by: two stamps each. The median hides single images that are late.
-double stamp_sigma(std::vector<double> late_s, std::vector<double> known_s2, double rms) {
-  if (late_s.size() < kFewestLate) return 0;
-  for (double& late : late_s) late = std::abs(late);
-  const double sigma = 1.4826 * median(late_s), usual = 1.4826 * kLateUsual_s;
-  return std::sqrt(std::max(0.0, sigma * sigma - usual * usual - rms * rms * median(known_s2)) / 2);
+/// Of each stamp. A pair shows the noise of its two stamps, and so does the pair that begins where it ends, of the stamp between them
+/// with the other sign: the difference has six times the variance of one. What lasts longer than a pair, as a gyroscope that drifts,
+/// is in neither. The median hides single images that are late.
+double stamp_sigma(const std::vector<LateImage>& late) {
+  std::vector<double> difference_s, known_s2;
+  auto before = late.begin();
+  for (const LateImage& l : late) {
+    while (before->to < l.from) ++before;
+    if (before->to != l.from) continue;
+    difference_s.push_back(std::abs(l.s - before->s));
+    known_s2.push_back(1.5 * (l.known_s2 + before->known_s2));  // of the image between, twice the noise
+  }
+  if (difference_s.size() < kFewestLate) return 0;
+  const double sigma = 1.4826 * median(difference_s), usual = 1.4826 * kLateUsual_s;
+  return std::sqrt(std::max(0.0, sigma * sigma - usual * usual - median(known_s2)) / 6);
+}
+
+/// The body between two images.
+struct Turn {
+  Mat3 R;                               ///< by the readings
+  Eigen::Matrix<double, 3, 8> by_unknowns;
+  Mat3 mounting;
+  Vec3 rate_a, rate_b;
+  double line_delay_s;
+};
+
+/// What the direction of a track in the second image is off by, in the plane across it, and what that depends on (Y1-Y3).
+struct Equation {
+  Vec3 expected, normal;  ///< direction without parallax, and across it and what was seen
+  Vec2 off;
+  Eigen::Matrix<double, 2, 3> by_parallax;
+  Eigen::Matrix<double, 2, 8> J;
+  Vec2 by_late;
+  double variance;
+  Mat2 information = Mat2::Zero();  ///< with its robust weight
+};
+
+Equation equation_of(const SeenTwice& track, const Turn& turn) {
+  const Vec3 a = so3_exp(Vec3(turn.line_delay_s * track.rows_a * turn.rate_a)) * (turn.mounting * track.a);
+  const Vec3 b = so3_exp(Vec3(turn.line_delay_s * track.rows_b * turn.rate_b)) * (turn.mounting * track.b);
+  Equation q;
+  q.expected = turn.R.transpose() * a;
+  q.normal = q.expected.cross(b);
+  q.by_parallax.row(0) = q.expected.unitOrthogonal();
+  q.by_parallax.row(1) = q.expected.cross(q.by_parallax.row(0).transpose());
+  q.off = q.by_parallax * b;
+  const Eigen::Matrix<double, 2, 3> by_turn = -q.by_parallax * hat(q.expected);
+  q.J = by_turn * turn.by_unknowns;
+  q.J.col(4) +=
+      q.by_parallax * (track.rows_b * turn.rate_b.cross(b) - turn.R.transpose() * (track.rows_a * turn.rate_a.cross(a)));
+  q.by_late = by_turn * turn.rate_b;
+  q.variance = track.sigma * track.sigma;
+  return q;
+}
+
+Mat2 covariance(const Equation& q, const Vec2& shift) {
+  return q.variance * Mat2::Identity() + kDepths * kDepths * shift * shift.transpose();
+}
+
+struct ParallaxNormal {
+  Mat3 V;
+  Vec3 w;
+};
+
+/// By weights of this parallax.
+ParallaxNormal weigh(std::vector<Equation>& equations, const Vec3& parallax) {
+  ParallaxNormal out{1 / (kMostParallax * kMostParallax) * Mat3::Identity(), Vec3::Zero()};
+  for (Equation& q : equations) {
+    const Vec2 shift = q.by_parallax * parallax, r = q.off + shift;
+    q.information = covariance(q, shift).inverse();
+    q.information *= huber(r.dot(q.information * r), kHuber_sigmas).weight;
+    out.V += q.by_parallax.transpose() * q.information * q.by_parallax;
+    out.w += q.by_parallax.transpose() * (q.information * q.off);
+  }
+  return out;
+}
+
+Vec3 fit_parallax(std::vector<Equation>& equations, Vec3 parallax) {
+  for (int i = 0; i < kParallaxIterations; ++i) {
+    const auto [V, w] = weigh(equations, parallax);
+    parallax = -V.ldlt().solve(w);
+  }
+  return parallax;
+}
+
+/// Negative logarithm of the likelihood.
+double unlikeliness(const std::vector<Equation>& equations, const Vec3& parallax) {
+  double out = 0;
+  for (const Equation& q : equations) {
+    const Vec2 shift = q.by_parallax * parallax, r = q.off + shift;
+    const Mat2 P = covariance(q, shift);
+    out += huber(r.dot(P.inverse() * r), kHuber_sigmas).cost + 0.5 * std::log(P.determinant());
+  }
+  return out;
+}
+
+/// Where parallax is large, its direction lies in the plane of both directions of every track: the least share of what noise would
+/// spread the planes' normals by, and not the least spread, which is always along the view.
+Vec3 by_planes(const std::vector<Equation>& equations) {
+  Mat3 spread = Mat3::Zero(), by_noise = 1e-6 * Mat3::Identity();
+  for (const Equation& q : equations) {
+    const Vec3 n = q.normal / std::sqrt(q.variance);
+    const double weight = 1 / std::max(1.0, n.squaredNorm() / 25);
+    spread += weight * n * n.transpose();
+    by_noise += weight * (Mat3::Identity() - q.expected * q.expected.transpose());
+  }
+  const Vec3 t = Eigen::GeneralizedSelfAdjointEigenSolver<Mat3>(spread, by_noise).eigenvectors().col(0).normalized();
+  double along = 0, most = 1e-9;
+  for (const Equation& q : equations) {
+    const Vec2 by_t = q.by_parallax * t;
+    along -= by_t.dot(q.off), most += by_t.squaredNorm();
+  }
+  return along / most * t;
 }
 
 Vec8 information(const GyroAlignmentPrior& p) {
@@ -122,14 +234,14 @@ void GyroAlignment::make_pairs() {
         while (s != a.sights.end() && s->id < seen.id) ++s;
         if (s == a.sights.end()) break;
         if (s->id == seen.id)
-          pair.planes.push_back({s->ray_B, seen.ray_B, std::hypot(s->sigma, seen.sigma), s->rows, seen.rows});
+          pair.tracks.push_back({s->ray_B, seen.ray_B, std::hypot(s->sigma, seen.sigma), s->rows, seen.rows});
       }
-      if (pair.planes.size() > kMostPlanes) {  // spread over all
-        std::vector<Plane> some;
-        for (std::size_t k = 0; k < kMostPlanes; ++k) some.push_back(pair.planes[k * pair.planes.size() / kMostPlanes]);
-        pair.planes = std::move(some);
+      if (pair.tracks.size() > kMostTracks) {  // spread over all
+        std::vector<SeenTwice> some;
+        for (std::size_t k = 0; k < kMostTracks; ++k) some.push_back(pair.tracks[k * pair.tracks.size() / kMostTracks]);
+        pair.tracks = std::move(some);
       }
-      if (pair.planes.size() >= kFewestPlanes) pairs_.push_back(std::move(pair));
+      if (pair.tracks.size() >= kFewestTracks) pairs_.push_back(std::move(pair));
       if (pairs_.size() > kMostPairs) pairs_.pop_front();
     }
     ++paired_;
@@ -139,60 +251,47 @@ void GyroAlignment::make_pairs() {
   while (turned_.size() > 2 && turned_[1].t < first - kMargin - kMargin) turned_.pop_front();
 }
 
-/// Point-to-plane equations of one pair, the direction of its translation eliminated (Y2-Y4).
+/// The equations of one pair, the parallax that its tracks have in common eliminated (Y4).
 void GyroAlignment::add_pair(const Pair& pair, const Vec8& x, Normal& out) const {
   const Time from = pair.from + Duration::from_seconds(x(3)), to = pair.to + Duration::from_seconds(x(3));
-  const double dt = (pair.to - pair.from).seconds();
-  const Vec3 bias = x.head<3>(), mounting = x.tail<3>();
-  const double line_delay_s = line_delay_s_ + x(4);
-  const Vec3 rate_a = rate(from) - bias, rate_b = rate(to) - bias;
+  const Vec3 bias = x.head<3>();
   const Quat raw = (orientation(from).conjugate() * orientation(to)).normalized();
-  const Mat3 by_bias = -dt * so3_right_jacobian(so3_log(raw));
-  const Mat3 R = (raw * so3_exp(Vec3(by_bias * bias))).toRotationMatrix();
-  const Mat3 M = so3_exp(mounting).toRotationMatrix();
-  std::vector<Vec3> a, b, n;
-  Mat3 spread = Mat3::Zero(), by_noise = 1e-6 * Mat3::Identity();
-  for (const Plane& p : pair.planes) {
-    a.push_back(so3_exp(Vec3(line_delay_s * p.rows_a * rate_a)) * (M * p.a));
-    b.push_back(so3_exp(Vec3(line_delay_s * p.rows_b * rate_b)) * (M * p.b));
-    n.push_back(a.back().cross(R * b.back()) / p.sigma);
-    const double weight = 1 / std::max(1.0, n.back().squaredNorm() / 25);
-    spread += weight * n.back() * n.back().transpose();
-    by_noise += weight * (Mat3::Identity() - a.back() * a.back().transpose());
+  const Mat3 by_bias = -(pair.to - pair.from).seconds() * so3_right_jacobian(so3_log(raw));
+  Turn turn;
+  turn.R = (raw * so3_exp(Vec3(by_bias * bias))).toRotationMatrix();
+  turn.mounting = so3_exp(Vec3(x.tail<3>())).toRotationMatrix();
+  turn.rate_a = rate(from) - bias, turn.rate_b = rate(to) - bias;
+  turn.line_delay_s = line_delay_s_ + x(4);
+  turn.by_unknowns << by_bias, turn.rate_b - turn.R.transpose() * turn.rate_a, Vec3::Zero(), Mat3::Identity() - turn.R.transpose();
+
+  std::vector<Equation> equations;
+  for (const SeenTwice& track : pair.tracks) equations.push_back(equation_of(track, turn));
+  const Vec3 from_none = fit_parallax(equations, Vec3::Zero()), from_planes = fit_parallax(equations, by_planes(equations));
+  const bool planes = unlikeliness(equations, from_planes) < unlikeliness(equations, from_none);
+  const auto [V, w] = weigh(equations, planes ? from_planes : from_none);
+  Eigen::Matrix<double, 8, 3> X = Eigen::Matrix<double, 8, 3>::Zero();
+  Vec3 X_late = Vec3::Zero();
+  double H_late = 0, g_late = 0, cost = 0, rows = -3;
+  for (const Equation& q : equations) {
+    const Vec2 weighted = q.information * q.off;
+    const Eigen::Matrix<double, 2, 3> by_parallax = q.information * q.by_parallax;
+    out.H += q.J.transpose() * q.information * q.J, out.g += q.J.transpose() * weighted;
+    X += q.J.transpose() * by_parallax;
+    H_late += q.by_late.dot(q.information * q.by_late), g_late += q.by_late.dot(weighted);
+    X_late += by_parallax.transpose() * q.by_late;
+    cost += q.off.dot(weighted);
+    rows += q.variance * q.information.trace();  // what parallax hides counts for nothing
   }
-  // The least share of what noise would spread the normals by, and not the least spread, which is always along the view.
-  const Vec3 t = Eigen::GeneralizedSelfAdjointEigenSolver<Mat3>(spread, by_noise).eigenvectors().col(0).normalized();
-  const Vec3 e = t.unitOrthogonal(), f = t.cross(e);
-  Eigen::Matrix<double, 3, 8> turn;  // of R by the unknowns
-  turn << by_bias, rate_b - R.transpose() * rate_a, Vec3::Zero(), Mat3::Identity() - R.transpose();
-  Mat2 V = 1e-12 * Mat2::Identity();
-  Vec2 w = Vec2::Zero();
-  Eigen::Matrix<double, 8, 2> X = Eigen::Matrix<double, 8, 2>::Zero();
-  double H_late = 0, g_late = 0;
-  Vec2 X_late = Vec2::Zero();
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    const Plane& p = pair.planes[k];
-    const double to_plane = p.sigma * std::max(kEpipole, t.cross(a[k]).norm());
-    const double r = t.dot(n[k]) * p.sigma / to_plane;
-    const RobustValue robust = huber(r * r, kHuber_sigmas);
-    Vec8 J = (-(t.cross(a[k])).transpose() * R * hat(b[k]) * turn / to_plane).transpose();
-    J(4) += (t.dot(p.rows_a * rate_a.cross(a[k]).cross(R * b[k])) + t.dot(a[k].cross(R * (p.rows_b * rate_b.cross(b[k]))))) / to_plane;
-    const double J_late = -t.cross(a[k]).dot(R * b[k].cross(rate_b)) / to_plane;
-    const Vec2 d = p.sigma / to_plane * Vec2(e.dot(n[k]), f.dot(n[k]));
-    H_late += robust.weight * J_late * J_late, g_late += robust.weight * r * J_late, X_late += robust.weight * J_late * d;
-    out.H += robust.weight * J * J.transpose(), out.g += robust.weight * r * J;
-    V += robust.weight * d * d.transpose(), w += robust.weight * r * d;
-    X += robust.weight * J * d.transpose();
-    out.cost += robust.weight * r * r;
-    ++out.rows;
-  }
-  const Mat2 V_inverse = V.inverse();
-  const Eigen::Matrix<double, 8, 2> gain = X * V_inverse;
+  const Mat3 V_inverse = V.inverse();
+  const Eigen::Matrix<double, 8, 3> gain = X * V_inverse;
   H_late -= X_late.dot(V_inverse * X_late), g_late -= X_late.dot(V_inverse * w);
-  if (H_late > 1 / (kLateShows_s * kLateShows_s)) out.late_s.push_back(-g_late / H_late), out.known_s2.push_back(1 / H_late);
+  cost -= w.dot(V_inverse * w);
+  if (H_late > 1 / (kLateShows_s * kLateShows_s))
+    out.late.push_back({pair.from, pair.to, -g_late / H_late, std::max(0.0, cost - g_late * g_late / H_late) / std::max(1.0, rows) / H_late});
   out.H -= gain * X.transpose();
   out.g -= gain * w;
-  out.rows -= 2;
+  out.cost += cost;
+  out.rows += rows;
 }
 
 GyroAlignment::Normal GyroAlignment::linearise(const Vec8& x) const {
@@ -201,38 +300,43 @@ GyroAlignment::Normal GyroAlignment::linearise(const Vec8& x) const {
   return out;
 }
 
-GyroAlignmentEstimate GyroAlignment::solve_from(double time_offset_s) const {
+/// Gauss-Newton from `x`, in shorter steps: the directions of parallax, which weigh the tracks, follow each.
+GyroAlignmentEstimate GyroAlignment::solve_from(const Vec8& x) const {
   const Vec8 prior = information(prior_);
   GyroAlignmentEstimate out;
   out.pairs = static_cast<int>(pairs_.size());
-  out.x(3) = time_offset_s;
+  out.x = x;
   for (int i = 0; i < kIterations; ++i) {
     Normal normal = linearise(out.x);
-    out.rms = std::sqrt(normal.cost / std::max(1, normal.rows));
-    out.stamp_sigma_s = stamp_sigma(std::move(normal.late_s), std::move(normal.known_s2), out.rms);
+    out.rms = std::sqrt(normal.cost / std::max(1.0, normal.rows));
+    out.late = std::move(normal.late);
     const double rms = std::max(kLeastRms, out.rms), scale = 1 / (kShared * rms * rms);
     const GyroAlignmentEstimate::Mat H = scale * normal.H + GyroAlignmentEstimate::Mat(prior.asDiagonal());
     const Eigen::LDLT<GyroAlignmentEstimate::Mat> ldlt(H);
-    const Vec8 step = -ldlt.solve(scale * normal.g + prior.cwiseProduct(out.x));
+    const Vec8 step = -kShare * ldlt.solve(scale * normal.g + prior.cwiseProduct(out.x));
     out.covariance = ldlt.solve(GyroAlignmentEstimate::Mat::Identity());
     if (!step.allFinite()) break;
     out.x += step;
     out.x(3) = std::clamp(out.x(3), -kLargestOffset_s, kLargestOffset_s);
-    if (std::abs(step(3)) < 2e-5 && step.head<3>().norm() < 1e-4) break;
+    if (std::abs(step(3)) < kLeastStep_s && step.head<3>().norm() < kLeastStep_radps) break;
   }
   return out;
 }
 
 std::optional<GyroAlignmentEstimate> GyroAlignment::solve() {
   if (pairs_.empty()) return std::nullopt;
-  std::optional<GyroAlignmentEstimate> best;
-  for (const double start : kStarts_s) {
-    const GyroAlignmentEstimate found = solve_from(last_offset_s_ + start);
-    if (!best || found.rms < best->rms) best = found;
-    if (settled_) break;
+  GyroAlignmentEstimate best = solve_from(last_);
+  if (!settled_) {
+    for (const double start : kStarts_s) {
+      Vec8 x = Vec8::Zero();
+      x(3) = start;
+      GyroAlignmentEstimate found = solve_from(x);
+      if (found.rms < best.rms) best = std::move(found);
+    }
   }
-  last_offset_s_ = best->time_offset_s();
-  settled_ = best->time_offset_sigma_s() < kSettled_s;
+  best.stamp_sigma_s = stamp_sigma(best.late);
+  last_ = best.x;
+  settled_ = best.time_offset_sigma_s() < kSettled_s;
   return best;
 }
 

@@ -25,6 +25,18 @@ struct GyroAlignmentPrior {
   double rotation_rad = 0.02;      ///< of a mounting by its drawing
 };
 
+/// What the second stamp of a pair of images is off by, where it shows, and its variance by the tracks' noise.
+struct LateImage {
+  Time from, to;
+  double s, known_s2;
+};
+
+/// Directions of a track in two images, in the body's axes, and their rows from the middle.
+struct SeenTwice {
+  Vec3 a, b;
+  double sigma, rows_a, rows_b;
+};
+
 /// Corrections of what the rig says.
 struct GyroAlignmentEstimate {
   static constexpr int kSize = 8;
@@ -33,8 +45,9 @@ struct GyroAlignmentEstimate {
 
   Vec x = Vec::Zero();
   Mat covariance = Mat::Zero();
-  double stamp_sigma_s = 0;  ///< noise of each image's stamp, 0 where it does not show
-  double rms = 0;  ///< of the residuals, in standard deviations of a track
+  std::vector<LateImage> late;  ///< in the order of their images
+  double stamp_sigma_s = 0;     ///< noise of each image's stamp, 0 where it does not show
+  double rms = 0;               ///< of the residuals, in standard deviations of a track
   int pairs = 0;
 
   Vec3 gyro_bias_radps() const { return x.head<3>(); }
@@ -71,14 +84,9 @@ class GyroAlignment {
     Time t;  ///< on the IMU's clock, by the rig's offset
     std::vector<Sight> sights;
   };
-  /// Directions of a track in two images; the direction of the translation between them lies in their plane.
-  struct Plane {
-    Vec3 a, b;
-    double sigma, rows_a, rows_b;
-  };
   struct Pair {
     Time from, to;
-    std::vector<Plane> planes;
+    std::vector<SeenTwice> tracks;
   };
   struct Rotation {
     Time t;
@@ -88,9 +96,8 @@ class GyroAlignment {
     GyroAlignmentEstimate::Mat H = GyroAlignmentEstimate::Mat::Zero();
     GyroAlignmentEstimate::Vec g = GyroAlignmentEstimate::Vec::Zero();
     double cost = 0;
-    int rows = 0;
-    std::vector<double> late_s;    ///< what each pair's second stamp is off by, where it shows
-    std::vector<double> known_s2;  ///< and the variance of that by the noise of tracks that fit as well as assumed
+    double rows = 0;
+    std::vector<LateImage> late;
   };
 
   void add_readings(const ImuSegment& segment);
@@ -99,7 +106,7 @@ class GyroAlignment {
   Vec3 rate(Time t) const;
   Normal linearise(const GyroAlignmentEstimate::Vec& x) const;
   void add_pair(const Pair& pair, const GyroAlignmentEstimate::Vec& x, Normal& out) const;
-  GyroAlignmentEstimate solve_from(double time_offset_s) const;
+  GyroAlignmentEstimate solve_from(const GyroAlignmentEstimate::Vec& x) const;
 
   Mat3 R_BC_;
   double middle_row_px_, line_delay_s_;
@@ -109,7 +116,7 @@ class GyroAlignment {
   std::deque<Pair> pairs_;
   std::deque<Rotation> turned_;
   std::optional<Vec3> last_rate_;
-  double last_offset_s_ = 0;
+  GyroAlignmentEstimate::Vec last_ = GyroAlignmentEstimate::Vec::Zero();
   bool settled_ = false;
 };
 

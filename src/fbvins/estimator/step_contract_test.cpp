@@ -84,8 +84,8 @@ TEST(StepContract, HoldsWhenTheWindowJumpsAfterAGap) {
 
 TEST(StepContract, HoldsAfterARestartAsWell) {
   SimulatedFlight flight(Motion(0.6, 0.5), 33);
-  flight.images = [](int k) { return k < 60 || k >= 130; };
-  const LargestStep step = fly(flight, 260, EstimatorOptions{});
+  flight.images = [](int k) { return k < 60 || k >= 220; };  // longer than the readings carry the pose
+  const LargestStep step = fly(flight, 350, EstimatorOptions{});
   expect_within(step, EstimatorOptions{}, 0.005);  // a new start does not know its velocity as well
   EXPECT_EQ(step.restarts, 1);
   EXPECT_GT(step.poses, 120);
@@ -108,7 +108,7 @@ TEST(Level, IsReportedWhenTheTiltIsKnown) {
   Estimator estimator(flight.rig, exact);
   bool was_level = false;
   int unknown = 0;
-  for (int k = 0; k < 800; ++k) {
+  for (int k = 0; k < 400; ++k) {
     const Odometry o = estimator.process(flight.frame(k)).odometry;
     if (!o.health.has_pose()) continue;
     const double error = tilt_error(o.T_WB.q, flight.truth(k).T_FB.q);

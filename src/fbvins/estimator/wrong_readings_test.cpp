@@ -14,7 +14,9 @@ using test::EstimatedFlight;
 using test::Motion;
 using test::SimulatedFlight;
 
-constexpr int kFrom = 100, kTo = 145, kEnd = 200;
+constexpr int kFrom = 100, kTo = 145, kEnd = 360;
+/// Images that end as long after the drift has begun, and begin again after its end.
+constexpr int kDark = 25, kSeenAgain = 60;
 
 /// Errors are those in the newest W.
 struct Flown : EstimatedFlight {
@@ -22,8 +24,9 @@ struct Flown : EstimatedFlight {
 };
 
 /// The gyroscope drifts from kFrom on, and is right again from kTo on.
-Flown fly_with_drift(const Vec3& drift_radps2) {
+Flown fly_with_drift(const Vec3& drift_radps2, bool dark) {
   SimulatedFlight flight(Motion(0.7, 0.25), 1);
+  flight.images = [dark](int k) { return !dark || k < kFrom + kDark || k >= kFrom + kSeenAgain; };
   Estimator estimator(flight.rig, EstimatorOptions{});
   const Vec3 bias = flight.bias.gyro_radps;
   Flown out;
@@ -43,24 +46,25 @@ Flown fly_with_drift(const Vec3& drift_radps2) {
 }
 
 TEST(WrongReadings, AGyroscopeThatDriftsIsSeenBeforeItHasMovedThePoseFar) {
-  const Flown flown = fly_with_drift(Vec3(0, 0.03, 0));
+  const Flown flown = fly_with_drift(Vec3(0, 0.02, 0), false);
   int seen = kFrom;
   while (seen < kTo && flown.odometry[seen].health.reason != HealthReason::contradiction) ++seen;
   EXPECT_LT(seen, kTo);
-  EXPECT_LT(flown.error_m[seen], 0.05);
+  EXPECT_LT(flown.error_m[seen], 0.06);
   for (int k = kFrom; k < kEnd; ++k) {
     const Odometry& o = flown.odometry[k];
     EXPECT_LT(flown.error_m[k], 3 * std::sqrt(o.pose_covariance.topLeftCorner<3, 3>().trace())) << k;
   }
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
+  EXPECT_EQ(flown.odometry.back().reset_counter, flown.odometry[kFrom].reset_counter + 1) << "the pose has moved by an unknown amount";
 }
 
 /// A start may be as wrong as what ended the window before.
 TEST(WrongReadings, AfterARestartInAContradictionImagesAndReadingsHaveToAgreeForASecond) {
-  const Flown flown = fly_with_drift(Vec3(-0.06, 0, 0));
+  const Flown flown = fly_with_drift(Vec3(-0.06, 0, 0), true);
   const auto is = [](HealthState state) { return [state](const Odometry& o) { return o.health.state == state; }; };
   const auto lost = std::find_if(flown.odometry.begin(), flown.odometry.end(), is(HealthState::lost));
-  if (lost == flown.odometry.end()) GTEST_SKIP() << "this drift ends no window: docs/experiments/sensors.md";
+  ASSERT_NE(lost, flown.odometry.end());
   EXPECT_EQ(lost->health.reason, HealthReason::contradiction);
   const auto started = std::find_if(lost + 1, flown.odometry.end(), [](const Odometry& o) { return o.health.has_pose(); });
   const auto good = std::find_if(started, flown.odometry.end(), is(HealthState::good));
