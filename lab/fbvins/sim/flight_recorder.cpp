@@ -30,6 +30,7 @@ Vec2 place_in_pixel(int i, int samples) {
 FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig& rig, BodyMotion motion,
                                const Vec3& world_from_flight, std::shared_ptr<const World> world)
     : options_(options),
+      intervals_(options),
       motion_(std::move(motion)),
       world_from_flight_(world_from_flight),
       world_(std::move(world)),
@@ -110,6 +111,7 @@ void FlightRecorder::add_instant(Eye& eye, double t_s, int sample, int samples) 
 }
 
 Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {
+  eye.sensor.allow_longer(intervals_.longer(t_s));
   if (!eye.settled) {
     gather(eye, t_s, 0, 1);
     eye.sensor.settle(eye.radiance);

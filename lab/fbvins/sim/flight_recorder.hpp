@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fbvins/sim/dirt.hpp"
+#include "fbvins/sim/frame_times.hpp"
 #include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/propellers.hpp"
 #include "fbvins/sim/renderer.hpp"
@@ -28,6 +29,8 @@ class FlightRecorder {
   RenderedFrame render(double t_s, std::int64_t frame, bool with_depth);
   /// Error of the right image's stamp.
   Duration right_jitter(std::int64_t frame) const;
+  /// Error of the stamps of all images of a frame.
+  Duration stamp_error(std::int64_t frame) const { return fbvins::stamp_error(options_, frame); }
 
  private:
   /// A lens, or a face of one that sees more than 180 degrees.
@@ -57,6 +60,7 @@ class FlightRecorder {
   double exposed_s(std::size_t camera, double t_s) const;
 
   SimulationOptions options_;
+  ImageIntervals intervals_;
   BodyMotion motion_;
   Vec3 world_from_flight_;
   std::shared_ptr<const World> world_;

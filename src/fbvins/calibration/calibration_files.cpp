@@ -10,7 +10,6 @@
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/calibration_fields.hpp"
-#include "fbvins/io/csv.hpp"
 #include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {
@@ -158,9 +157,9 @@ std::string to_kalibr_imu(const ImuNoise& noise) {
 }
 
 std::string to_kalibr_rig(const RigCalibration& rig) {
-  std::string imu = "imu0:\n";
-  const std::string figures = to_kalibr_imu(rig.imu_noise);
-  for (const CsvLine& line : lines_of(figures)) imu += fmt::format("  {}\n", line.text);
+  std::string imu = "imu0:\n  ";
+  for (const char c : to_kalibr_imu(rig.imu_noise)) imu += c == '\n' ? std::string("\n  ") : std::string(1, c);
+  imu.resize(imu.size() - 2);  // after the last line end
   return to_kalibr_camchain(rig) + imu;
 }
 
