@@ -203,6 +203,35 @@ TEST(Checkup, LostImagesAreNoIrregularStamps) {
   EXPECT_TRUE(check_stamps(readings(), images, rig()).empty());
 }
 
+/// Stamps whose intervals are these in turns, each for `run` images, off by up to `off_ns`.
+std::vector<Time> stamps_in_turns(const std::vector<double>& intervals_ms, int run, std::int64_t off_ns) {
+  std::vector<Time> images{Time{1'100'000'000}};
+  for (std::size_t i = 0; images.back().seconds() < 6.9; ++i) {
+    const double ms = intervals_ms[i / static_cast<std::size_t>(run) % intervals_ms.size()];
+    const std::int64_t off = off_ns == 0 ? 0 : static_cast<std::int64_t>(i * 2654435761U % static_cast<std::size_t>(2 * off_ns)) - off_ns;
+    images.push_back(images.back() + Duration{static_cast<std::int64_t>(1e6 * ms) + off});
+  }
+  return images;
+}
+
+TEST(Checkup, IntervalsByExposureAreNoStampsOfArrival) {
+  const auto exact = stamps_in_turns({33.17, 40.05, 50.01, 59.96}, 9, 500);
+  EXPECT_TRUE(check_stamps(readings(), exact, rig()).empty());
+  EXPECT_TRUE(check_stamps(readings(), stamps_in_turns({33.3, 66.6}, 12, 0), rig()).empty()) << "half as many in less light";
+  auto lost = exact;
+  for (std::size_t i = 5; i + 1 < lost.size(); i += 9) lost.erase(lost.begin() + static_cast<std::ptrdiff_t>(i));
+  EXPECT_TRUE(says(check_stamps(readings(), lost, rig()), FindingKind::image_gaps)) << "lost ones are still missed";
+}
+
+TEST(Checkup, StampsOfArrivalAreNoIntervals) {
+  EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({33, 40, 50}, 1, 6'000'000), rig()), FindingKind::image_stamps));
+  EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({30, 30, 40}, 1, 0), rig()), FindingKind::image_stamps))
+      << "a clock that ticks every 10 ms";
+  EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({44, 45, 47, 48, 50, 51, 53, 56, 41}, 1, 0), rig()),
+                   FindingKind::image_stamps))
+      << "whole milliseconds";
+}
+
 TEST(Checkup, SeesLeftAndRightExchanged) {
   StereoFrame frame = wall(Time{1});
   EXPECT_FALSE(stereo_order(rig(), std::span(&frame, 1)).swapped());
