@@ -102,6 +102,30 @@ TEST(SensorKits, LongerIntervalsAllowLongerExposuresAndGainHasSteps) {
   EXPECT_LT(sensor.gain(), gain);
 }
 
+/// Each line where the camera is when it is read: the last line of a slow readout is the first one of a fast one later.
+TEST(SensorKits, ARollingShutterFollowsMotionThatChanges) {
+  const auto row_of = [](double readout_s, double t_s, int row) {
+    SimulationOptions options = with_sensors("l515");
+    options.camera.line_delay_us = 1e6 * readout_s / 360, options.camera.auto_exposure = false;
+    options.camera.shot_noise = options.camera.read_noise = 0, options.camera.min_exposure_ms = options.camera.max_exposure_ms = 0.05;
+    options.camera.sensitivity = 2000, options.camera.time_samples = 8;
+    auto simulation = prepare_simulation(options);
+    EXPECT_TRUE(simulation);
+    simulation->frames = {simulation->start + Duration::from_seconds(t_s)};
+    const auto image = render_frame(*simulation, 0).frame.left;
+    return std::vector<int>(image->row(row), image->row(row) + image->width());
+  };
+  const auto difference = [](const std::vector<int>& a, const std::vector<int>& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
+    return sum / static_cast<double>(a.size());
+  };
+  const double late_s = 0.072 * (356.5 - 180) / 360;  // of line 356 in a readout of 72 ms
+  const std::vector<int> rolled = row_of(0.072, 1.5, 356);
+  EXPECT_LT(difference(rolled, row_of(1e-5, 1.5 + late_s, 356)), 3);
+  EXPECT_GT(difference(rolled, row_of(1e-5, 1.5, 356)), 6);
+}
+
 TEST(SensorKits, StampsAreNoisyAndInOrder) {
   SimulationOptions options = with_sensors("arducam-fc");
   options.camera.stamp_noise_us = 9000, options.imu.stamp_jitter_us = 3000;

@@ -29,7 +29,7 @@ Diagnosis Examination::run() {
   turns();
   stereo();
   if (turns_agree_) motion();
-  if (motion_agrees_) accelerations();
+  if (motion_agrees_ && has_depths()) accelerations();
   blur();
   return done();
 }

@@ -48,6 +48,7 @@ class Examination {
   void keep(std::optional<Finding> finding) {
     if (finding) out_.findings.push_back(std::move(*finding));
   }
+  bool has_depths() const { return rig_.has_right() || rig_.depth; }
   bool has(FindingKind kind) const {
     return std::any_of(out_.findings.begin(), out_.findings.end(), [&](const Finding& f) { return f.kind == kind; });
   }

@@ -10,6 +10,7 @@
 #include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/imu_health.hpp"
+#include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
 namespace {
@@ -32,15 +33,31 @@ constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kGyro
 
 double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 
+/// Mean specific force over a quarter of a second around t.
+Vec3 mean_force(const ImuSeries& imu, Time t) {
+  constexpr int kSteps = 25;
+  Vec3 sum = Vec3::Zero();
+  for (int i = -kSteps / 2; i <= kSteps / 2; ++i) sum += imu.at(t + Duration{i * 10'000'000}).accel_mps2;
+  return sum / kSteps;
+}
+
+/// By how much the direction of the mean specific force turns otherwise than the gyroscope says, in half a second, in the mean of
+/// squares: most of it is gravity.
+double gravity_turns_off(const ImuSeries& imu) {
+  const Duration apart{500'000'000};
+  double sum = 0, count = 0;
+  for (Time t = imu.samples().front().t; imu.covers(t, t + apart); t = t + apart, ++count) {
+    const Quat turn = integrate_gyro(imu.segment(t, t + apart), Vec3::Zero());
+    sum += (mean_force(imu, t).normalized() - turn * mean_force(imu, t + apart).normalized()).squaredNorm();
+  }
+  return sum / std::max(count, 1.0);
+}
+
 }  // namespace
 
 void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
   if (has(FindingKind::clocks_apart)) return;
-  if (!rig_.has_right() && !rig_.depth) {
-    not_judged("gyroscope, accelerometer, lens, rotation and time between camera and IMU: one camera does not measure depth");
-    return;
-  }
   if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
     turns_seen_ = true;
     not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");
@@ -105,6 +122,7 @@ void Examination::gyro_unit(const TurnFit& fit) {
 
 /// Whether the accelerometer fits better with the whole IMU rotated than with the gyroscope's axes mixed up.
 bool Examination::accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const {
+  if (!has_depths()) return gravity_turns_off(imu_) <= gravity_turns_off(imu_.with_gyro(axes));
   StereoRig turned = rig_;
   turned.T_BC0 = {Mat3(R_CB.transpose()), rig_.T_BC0.p};
   const AccelFit as_mounted = fit_accelerations(pairs_, imu_, turned, {fit.offset_s, Vec3::Zero()});

@@ -8,6 +8,7 @@
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/lens_change.hpp"
+#include "fbvins/doctor/two_view.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -45,29 +46,64 @@ constexpr double kDifference_m = 1e-4;
 /// Weight, per feature, of a prior that keeps a translation where it is, for components that are not observable.
 constexpr double kTranslationPrior = 1e-4;
 
+/// How the camera turns around an image's time: a parabola through the integrals of the rate, which vibration does not disturb.
+struct LineTurn {
+  Vec3 rate = Vec3::Zero(), half_gain = Vec3::Zero();  ///< in C, rad/s, rad/s^2
+
+  LineTurn(const Hypothesis& h, Time t, const ImuSeries& imu) {
+    const double side_s = std::max(0.5 * std::abs(h.rolling_s), kLeastSide_s);
+    const Duration side = Duration::from_seconds(side_s);
+    const auto turned = [&](Time from, Time to) {
+      return Vec3(h.R_CB * h.scale.cwiseProduct(imu.turned(from, to) - (to - from).seconds() * h.bias));
+    };
+    const Vec3 before = turned(t - side, t), after = turned(t, t + side);
+    rate = (before + after) / (2 * side_s);
+    half_gain = (after - before) / (2 * side_s * side_s);
+  }
+  /// `v`, seen `late_s` after the image's time, in the axes of that time.
+  Vec3 back(double late_s, const Vec3& v) const {
+    const Vec3 theta = late_s * rate + late_s * late_s * half_gain, turned = theta.cross(v);
+    return v + turned + 0.5 * theta.cross(turned);
+  }
+  /// The other way.
+  Vec3 to(double late_s, const Vec3& v) const {
+    const Vec3 theta = late_s * rate + late_s * late_s * half_gain, turned = theta.cross(v);
+    return v - turned + 0.5 * theta.cross(turned);
+  }
+
+ private:
+  static constexpr double kLeastSide_s = 8e-3;
+};
+
 /// A pair's rotation under one hypothesis.
 struct PredictedTurn {
   Mat3 R_ba;
-  Vec3 rate_a, rate_b;  ///< in C, rad/s
+  LineTurn around_a, around_b;
+  bool without_depths;
 
-  PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu) {
+  PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu)
+      : around_a(h, pair.a + h.offset, imu), around_b(h, pair.b + h.offset, imu), without_depths(pair.without_depths) {
     const Time a = pair.a + h.offset, b = pair.b + h.offset;
     const Vec3 turn_B = h.scale.cwiseProduct(so3_log(integrate_gyro(imu.segment(a, b), h.bias)));
     R_ba = so3_exp(-(h.R_CB * turn_B)).toRotationMatrix();
-    rate_a = h.R_CB * (imu.at(a).gyro_radps - h.bias);
-    rate_b = h.R_CB * (imu.at(b).gyro_radps - h.bias);
   }
 };
 
-Vec3 small_turn(const Vec3& theta, const Vec3& v) { return v + theta.cross(v); }
-
-/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera.
+/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera. Without depths
+/// that across the epipolar line alone.
 std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray_a,
                              const Vec3& p_ab) {
   const double height = h.camera.height();
   const double late_a = h.rolling_s * (feature.a_px.y() / height - 0.5), late_b = h.rolling_s * (feature.b_px.y() / height - 0.5);
-  const Vec3 X_a = small_turn(late_a * turn.rate_a, ray_a.homogeneous()) - feature.inverse_depth * p_ab;
-  const Vec3 X_b = small_turn(-late_b * turn.rate_b, turn.R_ba * X_a);
+  if (turn.without_depths) {
+    const auto ray_b = h.camera.undistort(feature.b_px);
+    if (!ray_b) return std::nullopt;
+    const Vec3 a = turn.R_ba * turn.around_a.back(late_a, ray_a.homogeneous().normalized());
+    const Vec3 b = turn.around_b.back(late_b, ray_b->homogeneous().normalized());
+    return Vec2(h.camera.focal_px() * epipolar_angle(a, b, turn.R_ba * p_ab), 0);
+  }
+  const Vec3 X_a = turn.around_a.back(late_a, ray_a.homogeneous()) - feature.inverse_depth * p_ab;
+  const Vec3 X_b = turn.around_b.to(late_b, turn.R_ba * X_a);
   if (X_b.z() < 0.05) return std::nullopt;
   return Vec2(h.camera.distort(X_b.hnormalized()) - feature.b_px);
 }
@@ -101,6 +137,7 @@ void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double s
     const Vec3 step = -H.ldlt().solve(g);
     if (!step.allFinite()) return;
     pair.p_CaCb += step;
+    if (pair.without_depths) pair.p_CaCb.normalize();
   }
 }
 
@@ -201,7 +238,8 @@ void for_each_residual(const std::vector<FramePair>& pairs, const ImuSeries& imu
 double MotionProblem::typical_error() const {
   std::vector<double> norms;
   for_each_residual(pairs_, *imu_, hypothesis(), [&](double norm) { norms.push_back(norm); });
-  return 0.85 * median(norms);  // of a Rayleigh distribution
+  const bool one_coordinate = !pairs_.empty() && pairs_.front().without_depths;
+  return (one_coordinate ? 1.4826 : 0.85) * median(norms);  // of a normal, and of a Rayleigh distribution
 }
 
 double MotionProblem::capped_error() const {
