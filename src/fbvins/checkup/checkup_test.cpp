@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "fbvins/checkup/first_seconds.hpp"
+#include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
@@ -230,6 +231,43 @@ TEST(Checkup, StampsOfArrivalAreNoIntervals) {
   EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({44, 45, 47, 48, 50, 51, 53, 56, 41}, 1, 0), rig()),
                    FindingKind::image_stamps))
       << "whole milliseconds";
+}
+
+/// White noise of these densities at 200 Hz, at rest or in motion.
+std::vector<ImuSample> noisy(double gyro, double accel, bool moving) {
+  Rng rng(7);
+  std::vector<ImuSample> out;
+  for (std::int64_t i = 0; i < 2000; ++i) {
+    ImuSample s{Time{1'000'000'000 + i * 5'000'000}, {}, {}};
+    const double root = std::sqrt(200.0), phase = 0.02 * static_cast<double>(i);
+    for (int k = 0; k < 3; ++k)
+      s.gyro_radps(k) = gyro * root * rng.normal() + (moving ? 0.5 * std::sin(phase + k) : 0.01),
+      s.accel_mps2(k) = accel * root * rng.normal() + (moving ? std::cos(phase + 2 * k) : 0) + (k == 2 ? 9.8 : 0);
+    out.push_back(s);
+  }
+  return out;
+}
+
+TEST(Checkup, MeasuresTheNoiseThatIsDeclared) {
+  for (const bool moving : {false, true}) {
+    const auto readings = noisy(2e-4, 2e-3, moving);
+    const auto seen = reading_noise_seen(readings);
+    ASSERT_TRUE(seen);
+    EXPECT_NEAR(seen->quietest.gyro_radps_rthz, 2e-4, 5e-5);
+    EXPECT_NEAR(seen->quietest.accel_mps2_rthz, 2e-3, 5e-4);
+    EXPECT_EQ(seen->at_rest.has_value(), !moving);
+    ImuNoise declared, write;
+    declared.gyro_noise_density_radps_rthz = 2e-4, declared.accel_noise_density_mps2_rthz = 2e-3;
+    EXPECT_FALSE(check_declared_noise(readings, declared, write));
+    declared.accel_noise_density_mps2_rthz = 0.06;
+    const auto large = check_declared_noise(readings, declared, write);
+    ASSERT_TRUE(large);
+    EXPECT_EQ(large->kind, FindingKind::imu_noise);
+    EXPECT_NEAR(large->size, 35, 8);
+    EXPECT_NEAR(write.accel_noise_density_mps2_rthz, 4e-3, 1e-3);
+    declared.accel_noise_density_mps2_rthz = 1e-4;
+    EXPECT_EQ(check_declared_noise(readings, declared, write).has_value(), !moving) << "vibration may be all of it";
+  }
 }
 
 TEST(Checkup, SeesLeftAndRightExchanged) {

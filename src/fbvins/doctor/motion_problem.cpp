@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/lens_change.hpp"
@@ -89,6 +90,17 @@ struct PredictedTurn {
   }
 };
 
+/// Both directions of a feature in the axes of b at its time.
+std::optional<std::pair<Vec3, Vec3>> rays_in_b(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature,
+                                               const Vec2& ray_a) {
+  const auto ray_b = h.camera.undistort(feature.b_px);
+  if (!ray_b) return std::nullopt;
+  const double height = h.camera.height();
+  const double late_a = h.rolling_s * (feature.a_px.y() / height - 0.5), late_b = h.rolling_s * (feature.b_px.y() / height - 0.5);
+  return std::pair(Vec3(turn.R_ba * turn.around_a.back(late_a, ray_a.homogeneous().normalized())),
+                   turn.around_b.back(late_b, ray_b->homogeneous().normalized()));
+}
+
 /// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera. Without depths
 /// that across the epipolar line alone.
 std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray_a,
@@ -96,11 +108,9 @@ std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, con
   const double height = h.camera.height();
   const double late_a = h.rolling_s * (feature.a_px.y() / height - 0.5), late_b = h.rolling_s * (feature.b_px.y() / height - 0.5);
   if (turn.without_depths) {
-    const auto ray_b = h.camera.undistort(feature.b_px);
-    if (!ray_b) return std::nullopt;
-    const Vec3 a = turn.R_ba * turn.around_a.back(late_a, ray_a.homogeneous().normalized());
-    const Vec3 b = turn.around_b.back(late_b, ray_b->homogeneous().normalized());
-    return Vec2(h.camera.focal_px() * epipolar_angle(a, b, turn.R_ba * p_ab), 0);
+    const auto rays = rays_in_b(h, turn, feature, ray_a);
+    if (!rays) return std::nullopt;
+    return Vec2(h.camera.focal_px() * epipolar_angle(rays->first, rays->second, turn.R_ba * p_ab), 0);
   }
   const Vec3 X_a = turn.around_a.back(late_a, ray_a.homogeneous()) - feature.inverse_depth * p_ab;
   const Vec3 X_b = turn.around_b.to(late_b, turn.R_ba * X_a);
@@ -119,9 +129,21 @@ bool by_translation(const Hypothesis& h, const PredictedTurn& turn, const Paired
   return true;
 }
 
-/// Sets the pair's translation to the best one under a hypothesis, starting at the present one.
+/// The direction of a pair's translation under a hypothesis.
+Vec3 direction_under(const Hypothesis& h, const PredictedTurn& turn, const FramePair& pair) {
+  RayPairs rays;
+  for (const PairedFeature& feature : pair.features) {
+    const auto ray = h.camera.undistort(feature.a_px);
+    const auto both = ray ? rays_in_b(h, turn, feature, *ray) : std::nullopt;
+    if (both) rays.a.push_back(both->first), rays.b.push_back(both->second);
+  }
+  return rays.a.empty() ? pair.p_CaCb : Vec3(turn.R_ba.transpose() * translation_direction(rays));
+}
+
+/// Sets the pair's translation to the best one under a hypothesis, starting at the present one where features have depths.
 void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double sigma) {
   const PredictedTurn turn(h, pair, imu);
+  if (pair.without_depths) pair.p_CaCb = direction_under(h, turn, pair);
   for (int iteration = 0; iteration < 3; ++iteration) {
     Mat3 H = kTranslationPrior * static_cast<double>(pair.features.size()) * Mat3::Identity();
     Vec3 g = Vec3::Zero();

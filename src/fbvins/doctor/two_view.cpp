@@ -14,6 +14,8 @@ namespace fbvins {
 namespace {
 
 constexpr double kEpipole = 0.1;
+/// Features that move less count alike.
+constexpr double kLeastNormal_rad = 1e-3;
 constexpr std::size_t kFewestFeatures = 20;
 constexpr int kIterations = 12;
 constexpr double kSigmas = 2, kLeast_px = 0.1, kMost_px = 5;
@@ -22,12 +24,8 @@ constexpr double kSigmaOfMedian = 1.4826;
 /// Of the translation's direction beside what the features say, where they lie far away, per feature.
 constexpr double kPrior = 1e-6;
 
-struct Rays {
-  std::vector<Vec3> a, b;
-};
-
 /// What turns the rays of a into those of b as well as a rotation alone can: the start of the search.
-Quat turn_alone(const Rays& rays) {
+Quat turn_alone(const RayPairs& rays) {
   Quat q = Quat::Identity();  // R_ba
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     std::vector<double> norms;
@@ -49,25 +47,13 @@ Quat turn_alone(const Rays& rays) {
   return q;
 }
 
-/// The direction in which most features lie in one plane with both their rays, against what noise would make of them.
-Vec3 direction_of(const Rays& rays, const Quat& q_ba) {
-  Mat3 spread = Mat3::Zero(), by_noise = 1e-9 * Mat3::Identity();
-  for (std::size_t i = 0; i < rays.a.size(); ++i) {
-    const Vec3 seen = q_ba * rays.a[i], n = seen.cross(rays.b[i]);
-    const double weight = 1 / std::max(n.norm(), 1e-4);
-    spread += weight * n * n.transpose();
-    by_noise += weight * (Mat3::Identity() - seen * seen.transpose());
-  }
-  return Eigen::GeneralizedSelfAdjointEigenSolver<Mat3>(spread, by_noise).eigenvectors().col(0).normalized();
-}
-
 struct Step {
   Eigen::Matrix<double, 5, 5> H = Eigen::Matrix<double, 5, 5>::Zero();
   Eigen::Matrix<double, 5, 1> g = Eigen::Matrix<double, 5, 1>::Zero();
 };
 
 /// By a small turn of the rays of a (Exp(d) q_ba), and the direction of p along e and f.
-Step linearise(const Rays& rays, const Quat& q_ba, const Vec3& p, const Vec3& e, const Vec3& f, double threshold) {
+Step linearise(const RayPairs& rays, const Quat& q_ba, const Vec3& p, const Vec3& e, const Vec3& f, double threshold) {
   Step out;
   for (std::size_t i = 0; i < rays.a.size(); ++i) {
     const Vec3 seen = q_ba * rays.a[i], n = seen.cross(rays.b[i]);
@@ -83,12 +69,23 @@ Step linearise(const Rays& rays, const Quat& q_ba, const Vec3& p, const Vec3& e,
 
 }  // namespace
 
+Vec3 translation_direction(const RayPairs& rays) {
+  Mat3 spread = Mat3::Zero(), by_noise = 1e-9 * Mat3::Identity();
+  for (std::size_t i = 0; i < rays.a.size(); ++i) {
+    const Vec3 n = rays.a[i].cross(rays.b[i]);
+    const double weight = 1 / std::max(n.norm(), kLeastNormal_rad);
+    spread += weight * n * n.transpose();
+    by_noise += weight * (Mat3::Identity() - rays.a[i] * rays.a[i].transpose());
+  }
+  return Eigen::GeneralizedSelfAdjointEigenSolver<Mat3>(spread, by_noise).eigenvectors().col(0).normalized();
+}
+
 double epipolar_angle(const Vec3& a, const Vec3& b, const Vec3& p) {
   return p.dot(a.cross(b)) / std::max(kEpipole, p.cross(a).norm());
 }
 
 bool estimate_without_depths(const Camera& camera, FramePair& pair) {
-  Rays rays;
+  RayPairs rays;
   std::vector<PairedFeature> features;
   for (const PairedFeature& feature : pair.features) {
     const auto a = camera.undistort(feature.a_px), b = camera.undistort(feature.b_px);
@@ -99,7 +96,9 @@ bool estimate_without_depths(const Camera& camera, FramePair& pair) {
   if (features.size() < kFewestFeatures) return false;
   pair.features = std::move(features);
   Quat q = turn_alone(rays);
-  Vec3 p = direction_of(rays, q);
+  RayPairs turned = rays;
+  for (Vec3& ray : turned.a) ray = q * ray;
+  Vec3 p = translation_direction(turned);
   double sigma = 0;
   Step step;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
