@@ -19,6 +19,8 @@ constexpr std::size_t kFewestAtRest = 3;
 constexpr double kThirdDifference = 20;
 /// At rest the whole of a window is as its noise is: no slow motion of this many times its standard deviation.
 constexpr double kRestSpread = 1.6;
+/// And no rotor turns: accelerometers have less than half of this, m/s^2/sqrt(Hz), rotors more than twice of it.
+constexpr double kWithoutRotors = 0.01;
 /// Declared over seen from which a figure is wrong, either way. What a calibration allows for on purpose is less.
 constexpr double kTooLarge = 10, kTooSmall = 1.0 / 5;
 /// Data sheets and a quiet table show less than a flight: what is written allows for it (docs/calibration.md).
@@ -67,7 +69,7 @@ std::optional<ReadingNoiseSeen> reading_noise_seen(std::span<const ImuSample> sa
     if (!(white.gyro_radps_rthz > 0) || !(white.accel_mps2_rthz > 0)) continue;  // readings that repeat
     const auto less = [](double& least, double value) { least = least == 0 ? value : std::min(least, value); };
     less(seen.quietest.gyro_radps_rthz, white.gyro_radps_rthz), less(seen.quietest.accel_mps2_rthz, white.accel_mps2_rthz);
-    if (all.gyro_radps_rthz < kRestSpread * white.gyro_radps_rthz && all.accel_mps2_rthz < kRestSpread * white.accel_mps2_rthz)
+    if (white.accel_mps2_rthz < kWithoutRotors && all.gyro_radps_rthz < kRestSpread * white.gyro_radps_rthz && all.accel_mps2_rthz < kRestSpread * white.accel_mps2_rthz)
       rest.push_back(white);
   }
   if (seen.quietest.gyro_radps_rthz == 0) return std::nullopt;

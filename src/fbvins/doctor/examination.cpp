@@ -31,6 +31,7 @@ Diagnosis Examination::run() {
   stereo();
   if (turns_agree_) motion();
   if (motion_agrees_ && has_depths()) accelerations();
+  if (motion_agrees_) force();
   blur();
   return done();
 }

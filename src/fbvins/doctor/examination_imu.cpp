@@ -10,6 +10,7 @@
 #include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/imu_health.hpp"
+#include "fbvins/imu/nav_state.hpp"
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
@@ -30,6 +31,9 @@ constexpr double kMostCutOff = 0.2;
 constexpr double kAgreementOfPart = 0.95;
 constexpr std::size_t kFewestPairsOfPart = 20;
 constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kGyroBiasPractical_radps = 0.1;
+
+/// A change of one camera's lens must leave less than this share of the error.
+constexpr double kLensLeaves = 0.9;
 
 double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 
@@ -180,8 +184,14 @@ void Examination::motion() {
   gyro_bias_ = fit.gyro_bias_radps;
   gyro_bias(fit);
   out_.predicted_px = prediction_error_px(pairs_, imu_, {evidence_.rig, evidence_.rig.time_offset_s});
-  for (const MotionChange& change : fit.changes)
-    if (!(change.kind == FindingKind::focal_length && fit.log_focal)) motion_change(change);
+  // Without depths, what a shutter and a motion that changes within it leave of the error looks like a lens.
+  const bool lens_judged = has_depths() || fit.remaining_px < kLensLeaves * fit.error_px;
+  for (const MotionChange& change : fit.changes) {
+    const bool lens = change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
+                      change.kind == FindingKind::distortion;
+    if (lens && (!lens_judged || (change.kind == FindingKind::focal_length && fit.log_focal))) continue;
+    motion_change(change);
+  }
 }
 
 void Examination::motion_change(const MotionChange& change) {
@@ -199,6 +209,15 @@ void Examination::motion_change(const MotionChange& change) {
       if (change.axis < 0 || change.axis == i) factor(i) = std::exp(change.amount(0));
     imu_ = imu_.with_gyro(factor.asDiagonal());
     gyro_bias_ = factor.cwiseProduct(gyro_bias_);
+  } else if (change.kind == FindingKind::gyro_by_force) {
+    const double largest = change.amount.cwiseAbs().maxCoeff();
+    Finding& finding = found(change.kind, largest, sigma.maxCoeff(), "rad/s for each m/s^2");
+    finding.measured = fmt::format(
+        "the gyroscope reads up to {:.4f} +- {:.4f} rad/s of each m/s^2 of specific force, which changes its bias by {:.2f} rad/s where the IMU is turned over",
+        largest, finding.sigma, 2 * kGravity_mps2 * largest);
+    finding.expected = "less than 0.002, or a calibration that has it";
+    finding.advice =
+        "calibrate scale and axes of the IMU (fbvins calibrate --imu-axes), or give the matrices of its calibration (Kalibr's A, OpenVINS' Tg)";
   } else if (change.kind == FindingKind::rolling_shutter) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
     const double calibrated_ms = 1e3 * rig_.times(0).line_delay_s * rig_.left.height();

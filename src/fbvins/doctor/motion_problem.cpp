@@ -27,6 +27,9 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
       offset(Duration::from_seconds(start.offset_s + x(kTime))),
       bias(x.segment<3>(kBias)),
       scale((x.segment<3>(kAxis).array() + x(kScale)).exp().matrix()),
+      by_force((Mat3() << x(kForce), x(kForce + 1), x(kForce + 2), x(kForce + 3), x(kForce + 4), x(kForce + 5), x(kForce + 6),
+                x(kForce + 7), x(kForce + 8))
+                   .finished()),
       rolling_s(start.rig.times(0).line_delay_s * start.rig.left.height() + x(kRolling)) {}
 
 }  // namespace doctor::motion
@@ -34,9 +37,11 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
 namespace {
 
 constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3,
-                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2};
+                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2, 0.02, 0.02,
+                                                    0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02};
 constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4,
-                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
+                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5,
+                                              1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5};
 
 constexpr int kIterations = 4;
 /// Of a step towards the end of a lens model's range.
@@ -85,7 +90,10 @@ struct PredictedTurn {
   PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu)
       : around_a(h, pair.a + h.offset, imu), around_b(h, pair.b + h.offset, imu), without_depths(pair.without_depths) {
     const Time a = pair.a + h.offset, b = pair.b + h.offset;
-    const Vec3 turn_B = h.scale.cwiseProduct(so3_log(integrate_gyro(imu.segment(a, b), h.bias)));
+    ImuSegment segment = imu.segment(a, b);
+    if (!h.by_force.isZero(0))
+      for (ImuSample& sample : segment.samples) sample.gyro_radps -= h.by_force * sample.accel_mps2;
+    const Vec3 turn_B = h.scale.cwiseProduct(so3_log(integrate_gyro(segment, h.bias)));
     R_ba = so3_exp(-(h.R_CB * turn_B)).toRotationMatrix();
   }
 };
@@ -202,7 +210,7 @@ struct PairSystem {
     MatrixXd J(2, n_ + 3);
     for (std::size_t k = 0; k < moved.size(); ++k) {
       const Hypothesis& there = moved[k].there;
-      const auto ray_there = moved[k].unknown >= kFocal ? there.camera.undistort(feature.a_px) : ray;
+      const auto ray_there = moved[k].unknown >= kFocal && moved[k].unknown < kForce ? there.camera.undistort(feature.a_px) : ray;
       const auto r_there = ray_there ? residual(there, turns[k], feature, *ray_there, p_ab) : std::nullopt;
       if (!r_there) return;
       J.col(static_cast<Eigen::Index>(k)) = (*r_there - *r) / kStep[static_cast<std::size_t>(moved[k].unknown)];
