@@ -275,5 +275,28 @@ TEST(DoctorOfOneCamera, NamesMountingAndGyroscope) {
   EXPECT_NE(find(examine(degrees), FindingKind::gyro_units), nullptr) << all_of(examine(degrees));
 }
 
+TEST(DoctorOfOneCamera, NamesTheAccelerometersBiasScaleAndAxes) {
+  Evidence biased = one_camera(), scaled = one_camera(), crooked = one_camera();
+  for (ImuSample& sample : biased.imu) sample.accel_mps2 += Vec3(1.1, -0.8, 0.9);
+  expect_named(biased, FindingKind::accel_bias, 1.65, 0.3);
+  for (ImuSample& sample : scaled.imu) sample.accel_mps2 *= 1.15;  // less may be a bias, where the rig hardly turns over
+  const Diagnosis found = examine(scaled);
+  EXPECT_TRUE(find(found, FindingKind::accel_scale) != nullptr || find(found, FindingKind::accel_bias) != nullptr) << all_of(found);
+  const Mat3 M = (Mat3() << 1, 0.06, -0.05, 0, 1, 0.06, 0, 0, 1).finished();
+  for (ImuSample& sample : crooked.imu) sample.accel_mps2 = M * sample.accel_mps2;
+  expect_named(crooked, FindingKind::accel_alignment, 6, 2);
+}
+
+/// By two cameras, too: the accelerometer's axes of a RealSense before its calibration, and a gyroscope that reads forces.
+TEST(Doctor, NamesAxesThatAreNotSquareAndAGyroscopeThatReadsForces) {
+  Evidence crooked = good(), forced = good();
+  const Mat3 M = (Mat3() << 1, 0.06, -0.05, 0, 1, 0.06, 0, 0, 1).finished();
+  for (ImuSample& sample : crooked.imu) sample.accel_mps2 = M * sample.accel_mps2;
+  EXPECT_NE(find(examine(crooked), FindingKind::accel_alignment), nullptr) << all_of(examine(crooked));
+  const Mat3 A = (Mat3() << 0, 0.008, 0, -0.006, 0, 0.007, 0, 0.006, 0).finished();
+  for (ImuSample& sample : forced.imu) sample.gyro_radps += A * (sample.accel_mps2 - Vec3(0, 0, 9.8));
+  EXPECT_NE(find(examine(forced), FindingKind::gyro_by_force), nullptr) << all_of(examine(forced));
+}
+
 }  // namespace doctor_test
 }  // namespace fbvins

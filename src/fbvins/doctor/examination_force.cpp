@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "fbvins/doctor/examination.hpp"
 #include "fbvins/doctor/force_problem.hpp"
@@ -39,9 +41,22 @@ const std::vector<ChangeGroup>& groups() {
   return all;
 }
 
+/// Norm of what is significant of an amount: of a bias along an axis that the motion does not show nothing is said.
+double significant_part(const Amount& amount) {
+  double square = 0;
+  for (Eigen::Index i = 0; i < amount.value.size(); ++i)
+    if (std::abs(amount.value(i)) > kSignificant * std::sqrt(amount.covariance(i, i))) square += std::pow(amount.value(i), 2);
+  return std::sqrt(square);
+}
+
 }  // namespace
 
 void Examination::force() {
+  if (!has_depths() && accel_unit_ != 1) {
+    std::vector<ImuSample> samples = imu_.samples();
+    for (ImuSample& sample : samples) sample.accel_mps2 *= accel_unit_;
+    imu_ = ImuSeries(samples);
+  }
   ForceProblem problem(windows_of(evidence_, imu_, rig_, offset_s_, gyro_bias_), rig_.T_BC0.p, rig_.left.focal_px());
   problem.free = kBiasGroup.unknowns;
   problem.begin();
@@ -72,13 +87,19 @@ void Examination::force() {
       sigma(2)));
   for (const ChangeGroup* group : found) {
     const Amount amount = amount_of(*group, problem, *last);
-    if (amount.value.norm() >= group->practical && amount.sigmas() > kSignificant) force_change(*group, amount);
+    const double sigma_max = amount.covariance.diagonal().cwiseSqrt().maxCoeff();
+    const bool certain = group != &kBiasGroup || amount.value.norm() > kSignificant * sigma_max;
+    if (certain && significant_part(amount) >= group->practical) force_change(*group, amount);
   }
+  // A mean reading that is not gravity's is told by its cause.
+  if (may_be_bias_ && (has(FindingKind::accel_bias) || has(FindingKind::accel_scale)))
+    std::erase_if(out_.findings, [](const Finding& f) { return f.kind == FindingKind::accel_units; });
 }
 
 void Examination::force_change(const ChangeGroup& group, const Amount& amount) {
   const double sigma = amount.covariance.diagonal().cwiseSqrt().maxCoeff();
-  if (group.kind == FindingKind::accel_bias && !has_depths()) {
+  if (group.kind == FindingKind::accel_bias && !has(FindingKind::accel_bias)) {
+    std::erase_if(out_.not_judged, [](const std::string& text) { return text.starts_with("the accelerometer's bias"); });
     const Vec3 bias = -amount.value;
     Finding& finding = found(group.kind, bias.norm(), sigma, "m/s^2");
     finding.measured = fmt::format("the accelerometer's bias is ({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", bias.x(), bias.y(),
