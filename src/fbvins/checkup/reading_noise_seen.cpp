@@ -81,7 +81,7 @@ std::optional<Finding> check_declared_noise(std::span<const ImuSample> samples, 
   const auto seen = reading_noise_seen(samples);
   if (!seen) return std::nullopt;
   Finding finding;
-  finding.kind = FindingKind::imu_noise, finding.unit = "times what the readings show";
+  finding.kind = FindingKind::imu_noise, finding.unit = kOfReadings;
   const auto judge = [&](const char* sensor, double said, double quietest, double at_rest, double& written) {
     const bool large = said > kTooLarge * quietest, small = at_rest > 0 && said < kTooSmall * at_rest;
     if (!large && !small) return;

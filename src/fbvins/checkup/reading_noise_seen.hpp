@@ -25,6 +25,9 @@ struct ReadingNoiseSeen {
 /// None for less than three seconds of readings.
 std::optional<ReadingNoiseSeen> reading_noise_seen(std::span<const ImuSample> samples);
 
+/// The unit of such a finding.
+inline constexpr const char* kOfReadings = "times what the readings show";
+
 /// Densities that are declared and cannot be those of these readings; with the figures to write in `write`.
 std::optional<Finding> check_declared_noise(std::span<const ImuSample> samples, const ImuNoise& declared, ImuNoise& write);
 

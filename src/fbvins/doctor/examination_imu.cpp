@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string>
 
+#include "fbvins/checkup/noise_figures.hpp"
+#include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/imu_health.hpp"
@@ -122,6 +124,9 @@ void Examination::gyro_unit(const TurnFit& fit) {
   finding.expected = "1, in rad/s";
   finding.advice = advice;
   imu_ = imu_.with_gyro(factor * Mat3::Identity());
+  // The readings' noise was measured in the wrong unit.
+  if (std::erase_if(out_.findings, [](const Finding& f) { return f.kind == FindingKind::imu_noise && f.unit == kOfReadings; }) > 0)
+    rig_.imu_noise = plausible(evidence_.rig.imu_noise);
 }
 
 /// Whether the accelerometer fits better with the whole IMU rotated than with the gyroscope's axes mixed up.
