@@ -8,11 +8,13 @@
 #include "apps/progress.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/boards/hung_tags.hpp"
+#include "fbvins/calibration/calibration_files.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
+#include "fbvins/sim/sensor_kits.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -26,6 +28,7 @@ examples:
   fbvins simulate fast --seed 7 --seconds 60 --out fast7
   fbvins simulate normal --set camera.line_delay_us=30 --set world.kind=hall --out rolling
   fbvins simulate --trajectory MH_01.csv --imu imu0.csv --out again     a real flight and its real IMU
+  fbvins simulate handheld --sensors l515 --out l515    cameras and IMU that people have; truth.yaml is their true calibration
   fbvins simulate board --out board                 a calibration board instead of a flight (docs/calibration.md)
   fbvins simulate dim --options > dim.yaml          every option of a preset with unit, range and meaning
 )";
@@ -34,7 +37,7 @@ examples:
 constexpr double kTagSize_m = 0.2;
 
 struct Arguments {
-  std::string preset = "normal", config, out, trajectory, imu;
+  std::string preset = "normal", sensors, config, out, trajectory, imu;
   std::vector<std::string> assignments;
   int seed = -1, max_images = 0, tags = 0;
   double seconds = 0;
@@ -44,6 +47,8 @@ struct Arguments {
 Result<SimulationOptions> options_of(const Arguments& arguments) {
   Result<SimulationOptions> options = simulation_preset(arguments.preset);
   if (!options) return options;
+  if (!arguments.sensors.empty())
+    if (Result<void> used = use_sensors(*options, arguments.sensors); !used) return used.error();
   const std::vector<OptionField> fields = fields_of(*options);
   if (!arguments.config.empty())
     if (Result<void> read = read_yaml_file(arguments.config, fields); !read) return read.error();
@@ -60,6 +65,13 @@ Result<SimulationOptions> options_of(const Arguments& arguments) {
 
 Result<void> write_options(SimulationOptions options, const std::string& folder) {
   return write_file_atomically(folder + "/simulation.yaml", write_yaml(fields_of(options)));
+}
+
+/// The rig as it is, in Kalibr's form: what a calibration would have to find. Biases move, and are in the truth beside the poses.
+Result<void> write_true_calibration(const Simulation& simulation, const std::string& folder) {
+  StereoRig rig = simulation.rig;
+  rig.imu_noise.axes.gyro = simulation.imu.gyro_axes, rig.imu_noise.axes.accel = simulation.imu.accel_axes;
+  return write_file_atomically(folder + "/truth.yaml", to_kalibr_rig(rig_calibration(rig)));
 }
 
 int simulate_flight(const Arguments& arguments) {
@@ -84,6 +96,8 @@ int simulate_flight(const Arguments& arguments) {
   if (arguments.tags > 0)
     if (Result<void> saved = write_file_atomically(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
       return fail(saved.error().message);
+  if (options->sensors != "none")
+    if (Result<void> saved = write_true_calibration(*simulation, arguments.out); !saved) return fail(saved.error().message);
   if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
   if (!arguments.quiet)
     fmt::print("{} frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(),
@@ -99,6 +113,8 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("PRESET", arguments->preset, "light, texture, motion or place (default normal)")
       ->check(CLI::IsMember(simulation_presets()));
+  command->add_option("--sensors", arguments->sensors, "cameras and IMU that people have (docs/simulator.md)")
+      ->check(CLI::IsMember(sensor_kits()));
   command->add_option("--out", arguments->out, "folder for the recording");
   command->add_option("--seed", arguments->seed, "seed of world, flight and noise")->check(CLI::NonNegativeNumber);
   command->add_option("--seconds", arguments->seconds, "length of the flight")->check(CLI::PositiveNumber);

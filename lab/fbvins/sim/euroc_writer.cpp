@@ -39,7 +39,7 @@ Result<void> finish_recording(EurocFolder& recording, const SimulatedImu& imu) {
 
 Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
                          const std::function<void(int done, int all)>& progress) {
-  Result<EurocFolder> recording = create_simulated_recording(folder, simulation.rig, options.depth);
+  Result<EurocFolder> recording = create_simulated_recording(folder, simulation.calibrated, options.depth);
   if (!recording) return recording.error();
   if (options.landmarks) {
     const std::string path = (std::filesystem::path(folder) / "mav0/landmarks.csv").string();

@@ -30,6 +30,7 @@ Vec2 place_in_pixel(int i, int samples) {
 FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig& rig, BodyMotion motion,
                                const Vec3& world_from_flight, std::shared_ptr<const World> world)
     : options_(options),
+      intervals_(options),
       motion_(std::move(motion)),
       world_from_flight_(world_from_flight),
       world_(std::move(world)),
@@ -86,6 +87,18 @@ void FlightRecorder::join_faces(Eye& eye) {
   }
 }
 
+/// A readout of 30 ms in the hands of a person is too long for a constant velocity.
+std::vector<Instant::Strip> FlightRecorder::strips_of(const Eye& eye, const Face& face, double first_line_s) const {
+  std::vector<Instant::Strip> strips;
+  for (int row = 0; row * Renderer::kTile < eye.height_px; ++row) {
+    const MotionState m =
+        motion_(first_line_s + (row * Renderer::kTile + 3.5) * options_.camera.line_delay_us * 1e-6);
+    const auto T_WC = m.T_WB * face.T_BC;
+    strips.push_back({T_WC.q, T_WC.p + world_from_flight_, face.T_BC.q.conjugate() * m.w_WB_B});
+  }
+  return strips;
+}
+
 /// The middle line is read at t. The faces of a lens are in one place.
 void FlightRecorder::add_instant(Eye& eye, double t_s, int sample, int samples) {
   const double line_s = options_.camera.line_delay_us * 1e-6, first_line = t_s - 0.5 * line_s * eye.height_px;
@@ -105,11 +118,13 @@ void FlightRecorder::add_instant(Eye& eye, double t_s, int sample, int samples) 
   for (Face& face : eye.faces) {
     instant.q_WC = (m.T_WB * face.T_BC).q;
     instant.w_WC_C = face.T_BC.q.conjugate() * m.w_WB_B;
+    if (line_s > 0 && options_.sensors != "none") instant.strips = strips_of(eye, face, first_line);
     face.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
   }
 }
 
 Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {
+  eye.sensor.allow_longer(intervals_.longer(t_s));
   if (!eye.settled) {
     gather(eye, t_s, 0, 1);
     eye.sensor.settle(eye.radiance);

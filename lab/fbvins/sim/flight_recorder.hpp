@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fbvins/sim/dirt.hpp"
+#include "fbvins/sim/frame_times.hpp"
 #include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/propellers.hpp"
 #include "fbvins/sim/renderer.hpp"
@@ -28,6 +29,8 @@ class FlightRecorder {
   RenderedFrame render(double t_s, std::int64_t frame, bool with_depth);
   /// Error of the right image's stamp.
   Duration right_jitter(std::int64_t frame) const;
+  /// Error of the stamps of all images of a frame.
+  Duration stamp_error(std::int64_t frame) const { return fbvins::stamp_error(options_, frame); }
 
  private:
   /// A lens, or a face of one that sees more than 180 degrees.
@@ -51,12 +54,14 @@ class FlightRecorder {
   Eye make_eye(const MountedCamera& mounted, double gain, std::uint64_t seed) const;
   void gather(Eye& eye, double t_s, double exposure_s, int samples);
   static void join_faces(Eye& eye);
+  std::vector<Instant::Strip> strips_of(const Eye& eye, const Face& face, double first_line_s) const;
   void add_instant(Eye& eye, double t_s, int sample, int samples);
   Image render_eye(Eye& eye, double t_s, std::int64_t frame);
   Duration offset(std::size_t camera, double t_s) const;
   double exposed_s(std::size_t camera, double t_s) const;
 
   SimulationOptions options_;
+  ImageIntervals intervals_;
   BodyMotion motion_;
   Vec3 world_from_flight_;
   std::shared_ptr<const World> world_;

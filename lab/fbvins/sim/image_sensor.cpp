@@ -66,12 +66,26 @@ ImageSensor::ImageSensor(const CameraModelOptions& options, const Camera& camera
 
 void ImageSensor::follow(double mean_radiance, double share) {
   if (!options_.auto_exposure) return;
-  const double lowest = std::log(options_.min_exposure_ms), highest = std::log(options_.max_exposure_ms * options_.max_gain);
+  const double lowest = std::log(options_.min_exposure_ms),
+               highest = std::log(longer_ * options_.max_exposure_ms * options_.max_gain);
   const double wanted = std::log(options_.target_level / (options_.sensitivity * std::max(mean_radiance, 1e-6)));
   log_product_ = std::clamp(log_product_ + share * (wanted - log_product_), lowest, highest);
+  divide_product();
+}
+
+/// Exposure first, gain for the rest.
+void ImageSensor::divide_product() {
   const double product = std::exp(log_product_);
-  exposure_ms_ = std::min(product, options_.max_exposure_ms);
+  exposure_ms_ = std::min(product, longer_ * options_.max_exposure_ms);
   gain_ = product / exposure_ms_;
+  if (options_.gain_step_db > 0)
+    gain_ = std::pow(10, options_.gain_step_db / 20 * std::round(20 * std::log10(gain_) / options_.gain_step_db));
+}
+
+void ImageSensor::allow_longer(double factor) {
+  if (factor == longer_) return;
+  longer_ = factor;
+  if (options_.auto_exposure) divide_product();
 }
 
 void ImageSensor::settle(const std::vector<float>& radiance) {

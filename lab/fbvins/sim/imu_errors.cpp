@@ -32,12 +32,20 @@ Vec3 digitise(const Vec3& x, double step, double range) {
 }  // namespace
 
 ImuErrors::ImuErrors(const ImuNoise& noise, const ImuModelOptions& options, std::uint64_t seed)
-    : noise_(noise), options_(options), white_(seed, 21), walk_(seed, 22), rumble_(seed, 25) {
+    : noise_(noise), options_(options), white_(seed, 21), walk_(seed, 22), rumble_(seed, 25), stamps_(seed, 26) {
   Rng constant(seed, 23);
   bias_.gyro_radps = normal3(constant, options.turn_on_gyro_bias_radps);
   bias_.accel_mps2 = normal3(constant, options.turn_on_accel_bias_mps2);
   gyro_axes_ = crooked_axes(constant, options.scale_error, options.misalignment_rad);
-  accel_axes_ = crooked_axes(constant, options.scale_error, options.misalignment_rad);
+  accel_axes_ = crooked_axes(constant, options.accel_crookedness * options.scale_error,
+                             options.accel_crookedness * options.misalignment_rad);
+}
+
+/// Stamps stay in order.
+Duration ImuErrors::stamp_error() {
+  if (options_.stamp_jitter_us == 0) return {};
+  const double most_s = 0.45 / noise_.rate_hz;
+  return Duration::from_seconds(std::clamp(1e-6 * options_.stamp_jitter_us * stamps_.normal(), -most_s, most_s));
 }
 
 ImuSample ImuErrors::read(Time t, const MotionState& m, const Shake& shake) {
@@ -51,7 +59,7 @@ ImuSample ImuErrors::read(Time t, const MotionState& m, const Shake& shake) {
                      normal3(rumble_, in_flight * options_.rumble_accel_mps2_rthz);
   bias_.gyro_radps += normal3(walk_, k * noise_.gyro_random_walk_radps2_rthz * std::sqrt(dt));
   bias_.accel_mps2 += normal3(walk_, k * noise_.accel_random_walk_mps3_rthz * std::sqrt(dt));
-  return {t, digitise(gyro, options_.gyro_step_radps, options_.gyro_range_radps),
+  return {t + stamp_error(), digitise(gyro, options_.gyro_step_radps, options_.gyro_range_radps),
           digitise(accel, options_.accel_step_mps2, options_.accel_range_mps2)};
 }
 

@@ -28,10 +28,12 @@ class ImuErrors {
   ImuSample read(Time t, const MotionState& motion, const Shake& shake);
 
  private:
+  Duration stamp_error();
+
   ImuNoise noise_;
   ImuModelOptions options_;
   // Each error has its own random numbers, so that switching one off does not change the others.
-  Rng white_, walk_, rumble_;
+  Rng white_, walk_, rumble_, stamps_;
   ImuBias bias_;
   Mat3 gyro_axes_, accel_axes_;
 };

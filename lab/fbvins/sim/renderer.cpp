@@ -167,8 +167,14 @@ void Renderer::add(const Instant& instant, const std::vector<Facet>& facets, con
   for (int row = 0; row < tiles_y_; ++row) {  // each row of tiles with the camera's pose when its middle line is read
     Instant strip = instant;
     const double dt = (row * kTile + 3.5) * instant.line_s;
-    strip.p_WC += dt * instant.v_WC;
-    strip.q_WC = (instant.q_WC * so3_exp(dt * instant.w_WC_C)).normalized();
+    strip.strips.clear();
+    if (instant.strips.empty()) {
+      strip.p_WC += dt * instant.v_WC;
+      strip.q_WC = (instant.q_WC * so3_exp(dt * instant.w_WC_C)).normalized();
+    } else {
+      const Instant::Strip& at = instant.strips[static_cast<std::size_t>(row)];
+      strip.q_WC = at.q_WC, strip.p_WC = at.p_WC, strip.w_WC_C = at.w_WC_C;
+    }
     look(strip, facets);
     distribute(row, row + 1);
     for (int t = row * tiles_x_; t < (row + 1) * tiles_x_; ++t) render_tile(t, strip, facets, light, weight);

@@ -24,12 +24,18 @@ struct Hits;
 
 /// A camera's motion at one instant of an exposure.
 struct Instant {
+  /// Where the camera is when the middle line of a row of tiles is read, and how it turns there.
+  struct Strip {
+    Quat q_WC;
+    Vec3 p_WC, w_WC_C;
+  };
   Quat q_WC = Quat::Identity();
   Vec3 p_WC = Vec3::Zero();
   Vec3 w_WC_C = Vec3::Zero();    ///< rad/s, for lines read one after the other
   Vec3 v_WC = Vec3::Zero();      ///< m/s, in W
   double line_s = 0;             ///< time from line to line; 0: all at once
   Vec2 shift_px = Vec2::Zero();  ///< offset of the ray within the pixel, for antialiasing
+  std::vector<Strip> strips = {};  ///< of all rows of tiles; empty: from the first line on as fast as there
 };
 
 class Renderer {

@@ -36,6 +36,7 @@ struct SensorStation::Impl {
 Result<SensorStation> SensorStation::create(const SimulationOptions& options, const FloorPlan& plan,
                                             const std::vector<Vec3>& path) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
+  if (auto intervals = image_intervals_s(options); !intervals) return intervals.error();
   Result<StereoRig> rig = simulated_rig(options);
   if (!rig) return rig.error();
   const auto seed = static_cast<std::uint64_t>(options.seed);
@@ -53,7 +54,11 @@ const World& SensorStation::world() const { return *impl_->world; }
 Time SensorStation::start() const { return kSimulationStart; }
 TrueState SensorStation::truth() const { return impl_->truth; }
 double SensorStation::next_image_s() const { return impl_->frames.next_s(); }
-double SensorStation::longest_exposure_s() const { return impl_->options.camera.max_exposure_ms * 1e-3; }
+double SensorStation::longest_exposure_s() const { 
+  const auto intervals = image_intervals_s(impl_->options);
+  const double longer = intervals->empty() ? 1 : intervals->back() / intervals->front();
+  return longer * impl_->options.camera.max_exposure_ms * 1e-3;
+}
 
 ImuSample SensorStation::read_imu(const MotionState& motion, const std::array<double, 4>& rotors) {
   const double dt = 1 / impl_->rig.imu_noise.rate_hz;

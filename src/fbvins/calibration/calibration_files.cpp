@@ -10,7 +10,6 @@
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/camera/opencv_lens.hpp"
 #include "fbvins/io/calibration_fields.hpp"
-#include "fbvins/io/csv.hpp"
 #include "fbvins/io/imu_axes_fields.hpp"
 
 namespace fbvins {

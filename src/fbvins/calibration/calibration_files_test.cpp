@@ -40,6 +40,7 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   StereoRig rig = with_cameras({}, {{written.cameras[0], written.T_BC[0].cast_frames<B, C0>()},
                                     {written.cameras[1], written.T_BC[1].cast_frames<B, C0>()}});
   rig.imu_noise = {1.5e-3, 2.5e-2, 3.5e-5, 4.5e-3, 400, 8, 80};
+  rig.imu_noise.axes.accel << 1.01, 0.002, 0, -0.004, 0.99, 0.001, 0.003, 0, 1.02;
   rig.time_offset_s = -0.0123, rig.line_delay_s = 3e-5;
   rig.right.set_own_times({0.002, 1e-5});
   rig.imu_noise.axes.gyro(0, 0) = 1.0078125, rig.imu_noise.axes.accel(2, 1) = 0.015625;
@@ -59,6 +60,7 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   EXPECT_LT((noise->axes.gyro - rig.imu_noise.axes.gyro).norm() + (noise->axes.accel - rig.imu_noise.axes.accel).norm(), 1e-12);
   EXPECT_EQ(noise->max_gyro_radps, 8);
   EXPECT_EQ(noise->max_accel_mps2, 80);
+  EXPECT_LT((noise->axes.accel - rig.imu_noise.axes.accel).norm(), 1e-12);
 }
 
 TEST(CalibrationFiles, ARollingShutterThatIsFoundIsWritten) {

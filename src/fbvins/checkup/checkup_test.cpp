@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "fbvins/checkup/first_seconds.hpp"
+#include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
@@ -201,6 +202,72 @@ TEST(Checkup, LostImagesAreNoIrregularStamps) {
   images.erase(images.begin() + 20);
   images.erase(images.begin() + 50, images.begin() + 52);
   EXPECT_TRUE(check_stamps(readings(), images, rig()).empty());
+}
+
+/// Stamps whose intervals are these in turns, each for `run` images, off by up to `off_ns`.
+std::vector<Time> stamps_in_turns(const std::vector<double>& intervals_ms, int run, std::int64_t off_ns) {
+  std::vector<Time> images{Time{1'100'000'000}};
+  for (std::size_t i = 0; images.back().seconds() < 6.9; ++i) {
+    const double ms = intervals_ms[i / static_cast<std::size_t>(run) % intervals_ms.size()];
+    const std::int64_t off = off_ns == 0 ? 0 : static_cast<std::int64_t>(i * 2654435761U % static_cast<std::size_t>(2 * off_ns)) - off_ns;
+    images.push_back(images.back() + Duration{static_cast<std::int64_t>(1e6 * ms) + off});
+  }
+  return images;
+}
+
+TEST(Checkup, IntervalsByExposureAreNoStampsOfArrival) {
+  const auto exact = stamps_in_turns({33.17, 40.05, 50.01, 59.96}, 9, 500);
+  EXPECT_TRUE(check_stamps(readings(), exact, rig()).empty());
+  EXPECT_TRUE(check_stamps(readings(), stamps_in_turns({33.3, 66.6}, 12, 0), rig()).empty()) << "half as many in less light";
+  auto lost = exact;
+  for (std::size_t i = 5; i + 1 < lost.size(); i += 9) lost.erase(lost.begin() + static_cast<std::ptrdiff_t>(i));
+  EXPECT_TRUE(says(check_stamps(readings(), lost, rig()), FindingKind::image_gaps)) << "lost ones are still missed";
+}
+
+TEST(Checkup, StampsOfArrivalAreNoIntervals) {
+  EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({33, 40, 50}, 1, 6'000'000), rig()), FindingKind::image_stamps));
+  EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({30, 30, 40}, 1, 0), rig()), FindingKind::image_stamps))
+      << "a clock that ticks every 10 ms";
+  EXPECT_TRUE(says(check_stamps(readings(), stamps_in_turns({44, 45, 47, 48, 50, 51, 53, 56, 41}, 1, 0), rig()),
+                   FindingKind::image_stamps))
+      << "whole milliseconds";
+}
+
+/// White noise of these densities at 200 Hz, at rest or in motion.
+std::vector<ImuSample> noisy(double gyro, double accel, bool moving) {
+  Rng rng(7);
+  std::vector<ImuSample> out;
+  for (std::int64_t i = 0; i < 2000; ++i) {
+    ImuSample s{Time{1'000'000'000 + i * 5'000'000}, {}, {}};
+    const double root = std::sqrt(200.0), phase = 0.02 * static_cast<double>(i);
+    for (int k = 0; k < 3; ++k)
+      s.gyro_radps(k) = gyro * root * rng.normal() + (moving ? 0.5 * std::sin(phase + k) : 0.01),
+      s.accel_mps2(k) = accel * root * rng.normal() + (moving ? std::cos(phase + 2 * k) : 0) + (k == 2 ? 9.8 : 0);
+    out.push_back(s);
+  }
+  return out;
+}
+
+TEST(Checkup, MeasuresTheNoiseThatIsDeclared) {
+  for (const bool moving : {false, true}) {
+    const auto readings = noisy(2e-4, 2e-3, moving);
+    const auto seen = reading_noise_seen(readings);
+    ASSERT_TRUE(seen);
+    EXPECT_NEAR(seen->quietest.gyro_radps_rthz, 2e-4, 5e-5);
+    EXPECT_NEAR(seen->quietest.accel_mps2_rthz, 2e-3, 5e-4);
+    EXPECT_EQ(seen->at_rest.has_value(), !moving);
+    ImuNoise declared, write;
+    declared.gyro_noise_density_radps_rthz = 2e-4, declared.accel_noise_density_mps2_rthz = 2e-3;
+    EXPECT_FALSE(check_declared_noise(readings, declared, write));
+    declared.accel_noise_density_mps2_rthz = 0.06;
+    const auto large = check_declared_noise(readings, declared, write);
+    ASSERT_TRUE(large);
+    EXPECT_EQ(large->kind, FindingKind::imu_noise);
+    EXPECT_NEAR(large->size, 35, 8);
+    EXPECT_NEAR(write.accel_noise_density_mps2_rthz, 4e-3, 1e-3);
+    declared.accel_noise_density_mps2_rthz = 1e-4;
+    EXPECT_EQ(check_declared_noise(readings, declared, write).has_value(), !moving) << "vibration may be all of it";
+  }
 }
 
 TEST(Checkup, SeesLeftAndRightExchanged) {

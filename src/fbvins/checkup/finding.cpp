@@ -15,6 +15,8 @@ std::string_view to_string(FindingKind kind) {
     case FindingKind::gyro_bias: return "gyro_bias";
     case FindingKind::accel_scale: return "accel_scale";
     case FindingKind::accel_bias: return "accel_bias";
+    case FindingKind::gyro_by_force: return "gyro_by_force";
+    case FindingKind::accel_alignment: return "accel_alignment";
     case FindingKind::imu_noise: return "imu_noise";
     case FindingKind::saturation: return "saturation";
     case FindingKind::vibration: return "vibration";

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "fbvins/checkup/image_intervals.hpp"
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -46,12 +48,13 @@ struct Gaps {
   Time longest_from;
 };
 
-Gaps gaps_between(std::span<const Time> stamps, double period_s, double gap_periods) {
+template <class IsGap>
+Gaps gaps_between(std::span<const Time> stamps, double period_s, IsGap&& is_gap) {
   Gaps gaps;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
     const double step = (stamps[i] - stamps[i - 1]).seconds();
     if (step > gaps.longest_s) gaps.longest_s = step, gaps.longest_from = stamps[i - 1];
-    if (step < gap_periods * period_s) continue;
+    if (!is_gap(step)) continue;
     ++gaps.count;
     gaps.missing += std::round(step / period_s) - 1;
   }
@@ -172,7 +175,7 @@ bool check_bursts(std::span<const double> steps_s, double mean_s, std::vector<Fi
 void check_reading_gaps(std::span<const ImuSample> samples, double rate, std::vector<Finding>& findings) {
   std::vector<Time> stamps;
   for (const ImuSample& sample : samples) stamps.push_back(sample.t);
-  Gaps gaps = gaps_between(stamps, 1 / rate, kReadingGap);
+  Gaps gaps = gaps_between(stamps, 1 / rate, [&](double step_s) { return step_s >= kReadingGap / rate; });
   const double singles = singles_missing(stamps, 1 / rate, gaps.missing);
   gaps.count += static_cast<int>(singles), gaps.missing += singles;
   gaps.share = gaps.missing / (gaps.missing + static_cast<double>(stamps.size()));
@@ -196,32 +199,45 @@ void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, st
   if (!bursts) check_reading_gaps(samples, rate, findings);
 }
 
+/// Missing images, of those that were taken at `period_s`; what is an interval of the camera's own is no gap.
+void check_image_gaps(std::span<const Time> images, double period_s, const std::optional<IntervalModes>& modes,
+                      std::vector<Finding>& findings) {
+  const auto is_gap = [&](double step_s) { return step_s >= kImageGap * period_s && !(modes && modes->holds(step_s)); };
+  const Gaps gaps = gaps_between(images, period_s, is_gap);
+  if (gaps.count == 0 || (gaps.longest_s <= kLongestImageGap_s && gaps.share <= kMostImagesMissing)) return;
+  Finding finding = gap_of(FindingKind::image_gaps, gaps.longest_s);
+  finding.measured = to_text(gaps, "images");
+  finding.expected = fmt::format("an image every {:.0f} ms", 1e3 * period_s);
+  finding.advice = "look for a bus, a disk or a compression that is too slow; fewer images at equal intervals are better";
+  findings.push_back(std::move(finding));
+}
+
+/// Root mean square deviation of stamps whose steps are whole periods; two stamps a step.
+double irregularity_s(std::span<const double> steps_s, double period_s) {
+  double sum = 0;
+  int regular = 0;
+  for (const double step : steps_s) {
+    const double periods = std::max(std::round(step / period_s), 1.0);
+    if (periods > 4) continue;  // a pause
+    sum += std::pow(step - periods * period_s, 2);
+    ++regular;
+  }
+  return std::sqrt(sum / std::max(regular, 1) / 2);
+}
+
 void check_images(std::span<const Time> images, std::vector<Finding>& findings) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < images.size(); ++i) steps.push_back((images[i] - images[i - 1]).seconds());
   const double period = typical_step_s(steps);
   if (!(period > 0)) return;
-  double sum = 0;
-  int regular = 0;
-  for (const double step : steps) {
-    const double periods = std::max(std::round(step / period), 1.0);
-    if (periods > 4) continue;  // a pause
-    sum += std::pow(step - periods * period, 2);
-    ++regular;
-  }
-  const Gaps gaps = gaps_between(images, period, kImageGap);
-  if (gaps.count > 0 && (gaps.longest_s > kLongestImageGap_s || gaps.share > kMostImagesMissing)) {
-    Finding finding = gap_of(FindingKind::image_gaps, gaps.longest_s);
-    finding.measured = to_text(gaps, "images");
-    finding.expected = fmt::format("an image every {:.0f} ms", 1e3 * period);
-    finding.advice = "look for a bus, a disk or a compression that is too slow; fewer images at equal intervals are better";
-    findings.push_back(std::move(finding));
-  }
-  const double irregular = std::sqrt(sum / std::max(regular, 1) / 2);
+  const std::optional<IntervalModes> modes = interval_modes(steps);
+  check_image_gaps(images, period, modes, findings);
+  const double irregular = modes ? modes->off_s : irregularity_s(steps, period);
   if (irregular < kMostIrregular_s) return;
   Finding finding;
   finding.kind = FindingKind::image_stamps;
-  finding.size = 1e3 * irregular, finding.sigma = finding.size / std::sqrt(2.0 * std::max(regular, 1)), finding.unit = "ms";
+  finding.size = 1e3 * irregular, finding.sigma = finding.size / std::sqrt(2.0 * static_cast<double>(steps.size()));
+  finding.unit = "ms";
   finding.measured = fmt::format("the images' stamps are {:.1f} +- {:.1f} ms off regular intervals (root mean square)",
                                  finding.size, finding.sigma);
   finding.expected = "a camera exposes at regular times, known to a tenth of a millisecond";

@@ -125,6 +125,8 @@ int open_figures(const Finding& finding) {
     case FindingKind::right_camera_turned:
     case FindingKind::epipolar_error:
     case FindingKind::gyro_bias:
+    case FindingKind::gyro_by_force:
+    case FindingKind::accel_alignment:
     case FindingKind::accel_bias: return 3;
     case FindingKind::baseline_direction:
     case FindingKind::principal_point:

@@ -226,5 +226,77 @@ TEST(Doctor, NoOffsetIsOfferedForStampsThatVary) {
   EXPECT_EQ(diagnosis.rig.time_offset_s, evidence.rig.time_offset_s);
 }
 
+/// What the left camera alone sees of the evidence, without depths.
+Evidence one_camera(const test::SyntheticSetup& setup = {}) {
+  Evidence evidence = test::SyntheticEvidence(setup).make();
+  evidence.rig = evidence.working_rig = with_one_camera(evidence.rig);
+  evidence.stereo.clear();
+  for (SeenFrame& frame : evidence.frames) {
+    frame.has_depths = false;
+    for (SeenFeature& feature : frame.features) feature.inverse_depth = 0;
+  }
+  return evidence;
+}
+
+void expect_named(const Evidence& evidence, FindingKind kind, double size, double tolerance) {
+  const Diagnosis diagnosis = examine(evidence);
+  const Finding* finding = find(diagnosis, kind);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_EQ(diagnosis.findings.size(), 1u) << all_of(diagnosis);
+  EXPECT_NEAR(finding->size, size, tolerance) << all_of(diagnosis);
+}
+
+TEST(DoctorOfOneCamera, IsSilentWhereAllIsWell) {
+  const Diagnosis diagnosis = examine(one_camera());
+  EXPECT_TRUE(diagnosis.findings.empty()) << all_of(diagnosis);
+  ASSERT_TRUE(diagnosis.predicted_px);
+  EXPECT_LT(*diagnosis.predicted_px, 0.5);
+}
+
+TEST(DoctorOfOneCamera, NamesTimes) {
+  test::SyntheticSetup late, rolling;
+  late.late_s = 0.04, rolling.rolling_s = 0.02;
+  expect_named(one_camera(late), FindingKind::time_offset, 40, 2);
+  expect_named(one_camera(rolling), FindingKind::rolling_shutter, 20, 3);
+}
+
+TEST(DoctorOfOneCamera, NamesMountingAndGyroscope) {
+  Evidence turned = one_camera();
+  turned.rig.T_BC0.q = (so3_exp(Vec3(0.05, -0.03, 0.04)) * turned.rig.T_BC0.q).normalized();
+  expect_named(turned, FindingKind::imu_camera_rotation, 4.05, 0.6);
+  Evidence scaled = one_camera(), biased = one_camera(), exchanged = one_camera(), degrees = one_camera();
+  for (ImuSample& sample : scaled.imu) sample.gyro_radps *= 1.08;
+  expect_named(scaled, FindingKind::gyro_scale, 8, 1);
+  for (ImuSample& sample : biased.imu) sample.gyro_radps += Vec3(0.2, -0.1, 0.1);
+  expect_named(biased, FindingKind::gyro_bias, 0.26, 0.03);
+  for (ImuSample& sample : exchanged.imu) std::swap(sample.gyro_radps.x(), sample.gyro_radps.y());
+  EXPECT_NE(find(examine(exchanged), FindingKind::gyro_axes), nullptr) << all_of(examine(exchanged));
+  for (ImuSample& sample : degrees.imu) sample.gyro_radps *= 180 / std::numbers::pi;
+  EXPECT_NE(find(examine(degrees), FindingKind::gyro_units), nullptr) << all_of(examine(degrees));
+}
+
+TEST(DoctorOfOneCamera, NamesTheAccelerometersBiasScaleAndAxes) {
+  Evidence biased = one_camera(), scaled = one_camera(), crooked = one_camera();
+  for (ImuSample& sample : biased.imu) sample.accel_mps2 += Vec3(1.1, -0.8, 0.9);
+  expect_named(biased, FindingKind::accel_bias, 1.65, 0.3);
+  for (ImuSample& sample : scaled.imu) sample.accel_mps2 *= 1.15;  // less may be a bias, where the rig hardly turns over
+  const Diagnosis found = examine(scaled);
+  EXPECT_TRUE(find(found, FindingKind::accel_scale) != nullptr || find(found, FindingKind::accel_bias) != nullptr) << all_of(found);
+  const Mat3 M = (Mat3() << 1, 0.06, -0.05, 0, 1, 0.06, 0, 0, 1).finished();
+  for (ImuSample& sample : crooked.imu) sample.accel_mps2 = M * sample.accel_mps2;
+  expect_named(crooked, FindingKind::accel_alignment, 6, 2);
+}
+
+/// By two cameras, too: the accelerometer's axes of a RealSense before its calibration, and a gyroscope that reads forces.
+TEST(Doctor, NamesAxesThatAreNotSquareAndAGyroscopeThatReadsForces) {
+  Evidence crooked = good(), forced = good();
+  const Mat3 M = (Mat3() << 1, 0.06, -0.05, 0, 1, 0.06, 0, 0, 1).finished();
+  for (ImuSample& sample : crooked.imu) sample.accel_mps2 = M * sample.accel_mps2;
+  EXPECT_NE(find(examine(crooked), FindingKind::accel_alignment), nullptr) << all_of(examine(crooked));
+  const Mat3 A = (Mat3() << 0, 0.008, 0, -0.006, 0, 0.007, 0, 0.006, 0).finished();
+  for (ImuSample& sample : forced.imu) sample.gyro_radps += A * (sample.accel_mps2 - Vec3(0, 0, 9.8));
+  EXPECT_NE(find(examine(forced), FindingKind::gyro_by_force), nullptr) << all_of(examine(forced));
+}
+
 }  // namespace doctor_test
 }  // namespace fbvins

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fbvins/checkup/noise_figures.hpp"
+#include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
@@ -29,7 +30,8 @@ Diagnosis Examination::run() {
   turns();
   stereo();
   if (turns_agree_) motion();
-  if (motion_agrees_) accelerations();
+  if (motion_agrees_ && has_depths()) accelerations();
+  if (motion_agrees_) force();
   blur();
   return done();
 }
@@ -64,11 +66,18 @@ void Examination::readings() {
   if (auto finding = check_noise_figures(evidence_.rig.imu_noise)) {
     rig_.imu_noise = plausible(rig_.imu_noise);
     out_.findings.push_back(std::move(*finding));
+  } else if (accel_unit_ == 1) {
+    keep(check_declared_noise(evidence_.imu, evidence_.rig.imu_noise, rig_.imu_noise));
   }
   if (accel_unit_ == 1) {
     keep(check_saturation(evidence_.imu));
     keep(check_vibration(evidence_.imu));
   }
+  if (const auto seen = reading_noise_seen(evidence_.imu))
+    measured(fmt::format("noise of the readings: at most {:.2g} rad/s and {:.2g} m/s^2 per sqrt(Hz), the calibration says {:.2g} and {:.2g}",
+                         seen->quietest.gyro_radps_rthz, seen->quietest.accel_mps2_rthz,
+                         evidence_.rig.imu_noise.gyro_noise_density_radps_rthz,
+                         evidence_.rig.imu_noise.accel_noise_density_mps2_rthz));
   const GravitySeen gravity = gravity_seen(evidence_.imu);
   const Vibration vibration = measure_vibration(evidence_.imu);
   measured(fmt::format(

@@ -3,6 +3,7 @@
 //   examination.cpp          order, readings by themselves, images by themselves
 //   examination_imu.cpp      the gyroscope against what the images show
 //   examination_accel.cpp    the accelerometer against what the images show
+//   examination_force.cpp    the same by the tracks of one camera, without depths
 //   examination_cameras.cpp  lenses and the pair of cameras
 //   examination_focal.cpp    the focal length that both lenses have in common
 #pragma once
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "fbvins/core/angle.hpp"
+#include "fbvins/doctor/change_search.hpp"
 #include "fbvins/doctor/doctor.hpp"
 #include "fbvins/doctor/motion_fit.hpp"
 #include "fbvins/doctor/stereo_fit.hpp"
@@ -48,6 +50,7 @@ class Examination {
   void keep(std::optional<Finding> finding) {
     if (finding) out_.findings.push_back(std::move(*finding));
   }
+  bool has_depths() const { return rig_.has_right() || rig_.depth; }
   bool has(FindingKind kind) const {
     return std::any_of(out_.findings.begin(), out_.findings.end(), [&](const Finding& f) { return f.kind == kind; });
   }
@@ -80,6 +83,8 @@ class Examination {
   bool position(const AccelFit& fit);
   void accel_bias(const AccelFit& fit);
   void accel_scale(const AccelFit& fit);
+  void force();
+  void force_change(const ChangeGroup& group, const Amount& amount);
   void baseline_length(double factor, double sigma);
   Diagnosis done();
 

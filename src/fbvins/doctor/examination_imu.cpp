@@ -7,9 +7,13 @@
 #include <cmath>
 #include <string>
 
+#include "fbvins/checkup/noise_figures.hpp"
+#include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/imu_health.hpp"
+#include "fbvins/imu/nav_state.hpp"
+#include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
 namespace {
@@ -30,17 +34,36 @@ constexpr double kAgreementOfPart = 0.95;
 constexpr std::size_t kFewestPairsOfPart = 20;
 constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kGyroBiasPractical_radps = 0.1;
 
+/// A change of one camera's lens must leave less than this share of the error.
+constexpr double kLensLeaves = 0.9;
+
 double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
+
+/// Mean specific force over a quarter of a second around t.
+Vec3 mean_force(const ImuSeries& imu, Time t) {
+  constexpr int kSteps = 25;
+  Vec3 sum = Vec3::Zero();
+  for (int i = -kSteps / 2; i <= kSteps / 2; ++i) sum += imu.at(t + Duration{i * 10'000'000}).accel_mps2;
+  return sum / kSteps;
+}
+
+/// By how much the direction of the mean specific force turns otherwise than the gyroscope says, in half a second, in the mean of
+/// squares: most of it is gravity.
+double gravity_turns_off(const ImuSeries& imu) {
+  const Duration apart{500'000'000};
+  double sum = 0, count = 0;
+  for (Time t = imu.samples().front().t; imu.covers(t, t + apart); t = t + apart, ++count) {
+    const Quat turn = integrate_gyro(imu.segment(t, t + apart), Vec3::Zero());
+    sum += (mean_force(imu, t).normalized() - turn * mean_force(imu, t + apart).normalized()).squaredNorm();
+  }
+  return sum / std::max(count, 1.0);
+}
 
 }  // namespace
 
 void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
   if (has(FindingKind::clocks_apart)) return;
-  if (!rig_.has_right() && !rig_.depth) {
-    not_judged("gyroscope, accelerometer, lens, rotation and time between camera and IMU: one camera does not measure depth");
-    return;
-  }
   if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
     turns_seen_ = true;
     not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");
@@ -101,10 +124,14 @@ void Examination::gyro_unit(const TurnFit& fit) {
   finding.expected = "1, in rad/s";
   finding.advice = advice;
   imu_ = imu_.with_gyro(factor * Mat3::Identity());
+  // The readings' noise was measured in the wrong unit.
+  if (std::erase_if(out_.findings, [](const Finding& f) { return f.kind == FindingKind::imu_noise && f.unit == kOfReadings; }) > 0)
+    rig_.imu_noise = plausible(evidence_.rig.imu_noise);
 }
 
 /// Whether the accelerometer fits better with the whole IMU rotated than with the gyroscope's axes mixed up.
 bool Examination::accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const {
+  if (!has_depths()) return gravity_turns_off(imu_) <= gravity_turns_off(imu_.with_gyro(axes));
   StereoRig turned = rig_;
   turned.T_BC0 = {Mat3(R_CB.transpose()), rig_.T_BC0.p};
   const AccelFit as_mounted = fit_accelerations(pairs_, imu_, turned, {fit.offset_s, Vec3::Zero()});
@@ -162,8 +189,14 @@ void Examination::motion() {
   gyro_bias_ = fit.gyro_bias_radps;
   gyro_bias(fit);
   out_.predicted_px = prediction_error_px(pairs_, imu_, {evidence_.rig, evidence_.rig.time_offset_s});
-  for (const MotionChange& change : fit.changes)
-    if (!(change.kind == FindingKind::focal_length && fit.log_focal)) motion_change(change);
+  // Without depths, what a shutter and a motion that changes within it leave of the error looks like a lens.
+  const bool lens_judged = has_depths() || fit.remaining_px < kLensLeaves * fit.error_px;
+  for (const MotionChange& change : fit.changes) {
+    const bool lens = change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
+                      change.kind == FindingKind::distortion;
+    if (lens && (!lens_judged || (change.kind == FindingKind::focal_length && fit.log_focal))) continue;
+    motion_change(change);
+  }
 }
 
 void Examination::motion_change(const MotionChange& change) {
@@ -181,6 +214,15 @@ void Examination::motion_change(const MotionChange& change) {
       if (change.axis < 0 || change.axis == i) factor(i) = std::exp(change.amount(0));
     imu_ = imu_.with_gyro(factor.asDiagonal());
     gyro_bias_ = factor.cwiseProduct(gyro_bias_);
+  } else if (change.kind == FindingKind::gyro_by_force) {
+    const double largest = change.amount.cwiseAbs().maxCoeff();
+    Finding& finding = found(change.kind, largest, sigma.maxCoeff(), "rad/s for each m/s^2");
+    finding.measured = fmt::format(
+        "the gyroscope reads up to {:.4f} +- {:.4f} rad/s of each m/s^2 of specific force, which changes its bias by {:.2f} rad/s where the IMU is turned over",
+        largest, finding.sigma, 2 * kGravity_mps2 * largest);
+    finding.expected = "less than 0.002, or a calibration that has it";
+    finding.advice =
+        "calibrate scale and axes of the IMU (fbvins calibrate --imu-axes), or give the matrices of its calibration (Kalibr's A, OpenVINS' Tg)";
   } else if (change.kind == FindingKind::rolling_shutter) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
     const double calibrated_ms = 1e3 * rig_.times(0).line_delay_s * rig_.left.height();

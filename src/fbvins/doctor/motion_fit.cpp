@@ -14,6 +14,8 @@ using namespace doctor::motion;
 
 /// One axis' scale must explain more than that of all, which it does not where the rig turns about that axis only.
 constexpr double kRareAxis = 1.03;
+/// And nine unknowns must explain much more than one.
+constexpr double kRareForce = 1.08;
 
 const std::vector<ChangeGroup>& groups() {
   static const std::vector<ChangeGroup> all{
@@ -23,6 +25,11 @@ const std::vector<ChangeGroup>& groups() {
       {FindingKind::gyro_scale, WhichLens::left, {kAxis}, 0.03, kRareAxis},
       {FindingKind::gyro_scale, WhichLens::left, {kAxis + 1}, 0.03, kRareAxis},
       {FindingKind::gyro_scale, WhichLens::left, {kAxis + 2}, 0.03, kRareAxis},
+      {FindingKind::gyro_by_force,
+       WhichLens::left,
+       {kForce, kForce + 1, kForce + 2, kForce + 3, kForce + 4, kForce + 5, kForce + 6, kForce + 7, kForce + 8},
+       2e-3,
+       kRareForce},
       {FindingKind::rolling_shutter, WhichLens::left, {kRolling}, 4e-3},
       {FindingKind::focal_length, WhichLens::left, {kFocal}, 0.02},
       {FindingKind::principal_point, WhichLens::left, {kCentre, kCentre + 1}, 8},

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/lens_change.hpp"
+#include "fbvins/doctor/two_view.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -25,6 +27,9 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
       offset(Duration::from_seconds(start.offset_s + x(kTime))),
       bias(x.segment<3>(kBias)),
       scale((x.segment<3>(kAxis).array() + x(kScale)).exp().matrix()),
+      by_force((Mat3() << x(kForce), x(kForce + 1), x(kForce + 2), x(kForce + 3), x(kForce + 4), x(kForce + 5), x(kForce + 6),
+                x(kForce + 7), x(kForce + 8))
+                   .finished()),
       rolling_s(start.rig.times(0).line_delay_s * start.rig.left.height() + x(kRolling)) {}
 
 }  // namespace doctor::motion
@@ -32,9 +37,11 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
 namespace {
 
 constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3,
-                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2};
+                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2, 0.02, 0.02,
+                                                    0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02};
 constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4,
-                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
+                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5,
+                                              1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5};
 
 constexpr int kIterations = 4;
 /// Of a step towards the end of a lens model's range.
@@ -45,29 +52,76 @@ constexpr double kDifference_m = 1e-4;
 /// Weight, per feature, of a prior that keeps a translation where it is, for components that are not observable.
 constexpr double kTranslationPrior = 1e-4;
 
+/// How the camera turns around an image's time: a parabola through the integrals of the rate, which vibration does not disturb.
+struct LineTurn {
+  Vec3 rate = Vec3::Zero(), half_gain = Vec3::Zero();  ///< in C, rad/s, rad/s^2
+
+  LineTurn(const Hypothesis& h, Time t, const ImuSeries& imu) {
+    const double side_s = std::max(0.5 * std::abs(h.rolling_s), kLeastSide_s);
+    const Duration side = Duration::from_seconds(side_s);
+    const auto turned = [&](Time from, Time to) {
+      return Vec3(h.R_CB * h.scale.cwiseProduct(imu.turned(from, to) - (to - from).seconds() * h.bias));
+    };
+    const Vec3 before = turned(t - side, t), after = turned(t, t + side);
+    rate = (before + after) / (2 * side_s);
+    half_gain = (after - before) / (2 * side_s * side_s);
+  }
+  /// `v`, seen `late_s` after the image's time, in the axes of that time.
+  Vec3 back(double late_s, const Vec3& v) const {
+    const Vec3 theta = late_s * rate + late_s * late_s * half_gain, turned = theta.cross(v);
+    return v + turned + 0.5 * theta.cross(turned);
+  }
+  /// The other way.
+  Vec3 to(double late_s, const Vec3& v) const {
+    const Vec3 theta = late_s * rate + late_s * late_s * half_gain, turned = theta.cross(v);
+    return v - turned + 0.5 * theta.cross(turned);
+  }
+
+ private:
+  static constexpr double kLeastSide_s = 8e-3;
+};
+
 /// A pair's rotation under one hypothesis.
 struct PredictedTurn {
   Mat3 R_ba;
-  Vec3 rate_a, rate_b;  ///< in C, rad/s
+  LineTurn around_a, around_b;
+  bool without_depths;
 
-  PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu) {
+  PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu)
+      : around_a(h, pair.a + h.offset, imu), around_b(h, pair.b + h.offset, imu), without_depths(pair.without_depths) {
     const Time a = pair.a + h.offset, b = pair.b + h.offset;
-    const Vec3 turn_B = h.scale.cwiseProduct(so3_log(integrate_gyro(imu.segment(a, b), h.bias)));
+    ImuSegment segment = imu.segment(a, b);
+    if (!h.by_force.isZero(0))
+      for (ImuSample& sample : segment.samples) sample.gyro_radps -= h.by_force * sample.accel_mps2;
+    const Vec3 turn_B = h.scale.cwiseProduct(so3_log(integrate_gyro(segment, h.bias)));
     R_ba = so3_exp(-(h.R_CB * turn_B)).toRotationMatrix();
-    rate_a = h.R_CB * (imu.at(a).gyro_radps - h.bias);
-    rate_b = h.R_CB * (imu.at(b).gyro_radps - h.bias);
   }
 };
 
-Vec3 small_turn(const Vec3& theta, const Vec3& v) { return v + theta.cross(v); }
+/// Both directions of a feature in the axes of b at its time.
+std::optional<std::pair<Vec3, Vec3>> rays_in_b(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature,
+                                               const Vec2& ray_a) {
+  const auto ray_b = h.camera.undistort(feature.b_px);
+  if (!ray_b) return std::nullopt;
+  const double height = h.camera.height();
+  const double late_a = h.rolling_s * (feature.a_px.y() / height - 0.5), late_b = h.rolling_s * (feature.b_px.y() / height - 0.5);
+  return std::pair(Vec3(turn.R_ba * turn.around_a.back(late_a, ray_a.homogeneous().normalized())),
+                   turn.around_b.back(late_b, ray_b->homogeneous().normalized()));
+}
 
-/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera.
+/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera. Without depths
+/// that across the epipolar line alone.
 std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray_a,
                              const Vec3& p_ab) {
   const double height = h.camera.height();
   const double late_a = h.rolling_s * (feature.a_px.y() / height - 0.5), late_b = h.rolling_s * (feature.b_px.y() / height - 0.5);
-  const Vec3 X_a = small_turn(late_a * turn.rate_a, ray_a.homogeneous()) - feature.inverse_depth * p_ab;
-  const Vec3 X_b = small_turn(-late_b * turn.rate_b, turn.R_ba * X_a);
+  if (turn.without_depths) {
+    const auto rays = rays_in_b(h, turn, feature, ray_a);
+    if (!rays) return std::nullopt;
+    return Vec2(h.camera.focal_px() * epipolar_angle(rays->first, rays->second, turn.R_ba * p_ab), 0);
+  }
+  const Vec3 X_a = turn.around_a.back(late_a, ray_a.homogeneous()) - feature.inverse_depth * p_ab;
+  const Vec3 X_b = turn.around_b.to(late_b, turn.R_ba * X_a);
   if (X_b.z() < 0.05) return std::nullopt;
   return Vec2(h.camera.distort(X_b.hnormalized()) - feature.b_px);
 }
@@ -83,9 +137,21 @@ bool by_translation(const Hypothesis& h, const PredictedTurn& turn, const Paired
   return true;
 }
 
-/// Sets the pair's translation to the best one under a hypothesis, starting at the present one.
+/// The direction of a pair's translation under a hypothesis.
+Vec3 direction_under(const Hypothesis& h, const PredictedTurn& turn, const FramePair& pair) {
+  RayPairs rays;
+  for (const PairedFeature& feature : pair.features) {
+    const auto ray = h.camera.undistort(feature.a_px);
+    const auto both = ray ? rays_in_b(h, turn, feature, *ray) : std::nullopt;
+    if (both) rays.a.push_back(both->first), rays.b.push_back(both->second);
+  }
+  return rays.a.empty() ? pair.p_CaCb : Vec3(turn.R_ba.transpose() * translation_direction(rays));
+}
+
+/// Sets the pair's translation to the best one under a hypothesis, starting at the present one where features have depths.
 void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double sigma) {
   const PredictedTurn turn(h, pair, imu);
+  if (pair.without_depths) pair.p_CaCb = direction_under(h, turn, pair);
   for (int iteration = 0; iteration < 3; ++iteration) {
     Mat3 H = kTranslationPrior * static_cast<double>(pair.features.size()) * Mat3::Identity();
     Vec3 g = Vec3::Zero();
@@ -101,6 +167,7 @@ void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double s
     const Vec3 step = -H.ldlt().solve(g);
     if (!step.allFinite()) return;
     pair.p_CaCb += step;
+    if (pair.without_depths) pair.p_CaCb.normalize();
   }
 }
 
@@ -143,7 +210,7 @@ struct PairSystem {
     MatrixXd J(2, n_ + 3);
     for (std::size_t k = 0; k < moved.size(); ++k) {
       const Hypothesis& there = moved[k].there;
-      const auto ray_there = moved[k].unknown >= kFocal ? there.camera.undistort(feature.a_px) : ray;
+      const auto ray_there = moved[k].unknown >= kFocal && moved[k].unknown < kForce ? there.camera.undistort(feature.a_px) : ray;
       const auto r_there = ray_there ? residual(there, turns[k], feature, *ray_there, p_ab) : std::nullopt;
       if (!r_there) return;
       J.col(static_cast<Eigen::Index>(k)) = (*r_there - *r) / kStep[static_cast<std::size_t>(moved[k].unknown)];
@@ -201,7 +268,8 @@ void for_each_residual(const std::vector<FramePair>& pairs, const ImuSeries& imu
 double MotionProblem::typical_error() const {
   std::vector<double> norms;
   for_each_residual(pairs_, *imu_, hypothesis(), [&](double norm) { norms.push_back(norm); });
-  return 0.85 * median(norms);  // of a Rayleigh distribution
+  const bool one_coordinate = !pairs_.empty() && pairs_.front().without_depths;
+  return (one_coordinate ? 1.4826 : 0.85) * median(norms);  // of a normal, and of a Rayleigh distribution
 }
 
 double MotionProblem::capped_error() const {

@@ -2,7 +2,8 @@
 // Private to the doctor: errors of features predicted from image to image with the gyroscope's rotation, as a least-squares
 // problem in changes of the setup. The unknowns: rotation (R_CB Exp(x), rad), time offset (s), gyroscope's bias (rad/s) and
 // logarithm of its scale and of that of each axis, time from an image's first line to its last (s), and of the left lens
-// logarithm of the focal length, principal point (px), radial coefficients.
+// logarithm of the focal length, principal point (px), radial coefficients. And what the gyroscope reads of a specific force, rad/s
+// for each m/s^2.
 #pragma once
 
 #include <optional>
@@ -25,7 +26,8 @@ enum : int {
   kFocal = 12,
   kCentre = 13,
   kRadial = 15,
-  kUnknowns = 17
+  kForce = 17,  ///< nine, row by row
+  kUnknowns = 26
 };
 
 /// The setup of the start, changed by x; made once for all pairs.
@@ -34,6 +36,7 @@ struct Hypothesis {
   Mat3 R_CB;
   Duration offset;
   Vec3 bias, scale;
+  Mat3 by_force;
   double rolling_s;
 
   Hypothesis(const MotionStart& start, const Eigen::VectorXd& x);

@@ -7,12 +7,13 @@
 #include <map>
 
 #include "fbvins/core/median.hpp"
+#include "fbvins/doctor/two_view.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr double kPair_s = 0.1;
+constexpr double kPair_s = 0.1, kPairSlack_s = 0.02;
 constexpr std::size_t kFewestFeatures = 20;
 constexpr double kHuber_px = 1.0;
 constexpr int kIterations = 12;
@@ -76,13 +77,13 @@ bool estimate_motion(const Camera& camera, FramePair& pair) {
   return sigma < 5 && pair.turn.allFinite();
 }
 
-std::vector<PairedFeature> in_both(const SeenFrame& a, const SeenFrame& b) {
+std::vector<PairedFeature> in_both(const SeenFrame& a, const SeenFrame& b, bool without_depths) {
   std::vector<PairedFeature> both;
   auto there = b.features.begin();
   for (const SeenFeature& feature : a.features) {
     while (there != b.features.end() && there->id < feature.id) ++there;
     if (there == b.features.end()) break;
-    if (there->id == feature.id && feature.inverse_depth > 0) both.push_back({feature.px, there->px, feature.inverse_depth});
+    if (there->id == feature.id && (without_depths || feature.inverse_depth > 0)) both.push_back({feature.px, there->px, feature.inverse_depth});
   }
   return both;
 }
@@ -148,23 +149,39 @@ Turns turns_at(const std::vector<FramePair>& pairs, const ImuSeries& imu, Durati
 
 }  // namespace
 
+namespace {
+
+/// The first frame after `a` that may be its partner; the number of frames where there is none.
+std::size_t partner_of(std::size_t a, const std::vector<SeenFrame>& frames, bool without_depths) {
+  std::size_t b = a + 1;
+  while (b < frames.size() &&
+         (without_depths ? (frames[b].t - frames[a].t).seconds() < kPair_s - kPairSlack_s : !frames[b].has_depths))
+    ++b;
+  return b;
+}
+
+}  // namespace
+
 std::vector<FramePair> pair_frames(const Evidence& evidence) {
   std::vector<FramePair> pairs;
-  std::size_t a = 0;
-  while (a < evidence.frames.size()) {
-    std::size_t b = a + 1;
-    if (!evidence.frames[a].has_depths) {
+  const std::vector<SeenFrame>& frames = evidence.frames;
+  const bool without_depths = !evidence.rig.has_right() && !evidence.rig.depth;
+  for (std::size_t a = 0; a < frames.size();) {
+    if (!without_depths && !frames[a].has_depths) {
       ++a;
       continue;
     }
-    while (b < evidence.frames.size() && !evidence.frames[b].has_depths) ++b;
-    if (b == evidence.frames.size()) break;
-    const double dt = (evidence.frames[b].t - evidence.frames[a].t).seconds();
+    const std::size_t b = partner_of(a, frames, without_depths);
+    if (b >= frames.size()) break;
     FramePair pair;
-    pair.a = evidence.frames[a].t, pair.b = evidence.frames[b].t;
+    pair.a = frames[a].t, pair.b = frames[b].t;
     pair.frame_a = a, pair.frame_b = b;
-    pair.features = in_both(evidence.frames[a], evidence.frames[b]);
-    if (dt > 0 && dt < 3 * kPair_s && estimate_motion(evidence.working_rig.left, pair)) pairs.push_back(std::move(pair));
+    pair.features = in_both(frames[a], frames[b], without_depths);
+    pair.without_depths = without_depths;
+    const Camera& camera = evidence.working_rig.left;
+    const bool near = pair.dt_s() > 0 && pair.dt_s() < 3 * kPair_s;
+    if (near && (without_depths ? estimate_without_depths(camera, pair) : estimate_motion(camera, pair)))
+      pairs.push_back(std::move(pair));
     a = b;
   }
   return pairs;

@@ -26,7 +26,8 @@ struct FramePair {
   std::size_t frame_a = 0, frame_b = 0;
   std::vector<PairedFeature> features;
   Vec3 turn = Vec3::Zero();        ///< rotation vector of R_CaCb, rad
-  Vec3 p_CaCb = Vec3::Zero();      ///< m, with the depths of the working rig
+  Vec3 p_CaCb = Vec3::Zero();      ///< m, with the depths of the working rig; of length 1 where nothing has depths
+  bool without_depths = false;     ///< of one camera alone
   Mat6 covariance = Mat6::Zero();  ///< of (turn, p)
   double rms_px = 0;
   double dt_s() const { return (b - a).seconds(); }

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
@@ -26,6 +27,9 @@ struct CameraModelOptions {
   double min_exposure_ms = 0.3;
   double max_exposure_ms = 5;
   double max_gain = 6;
+  double gain_step_db = 0;
+  std::string intervals_ms = "";
+  double interval_for_s = 3;
   double sensitivity = 60;
   double shot_noise = 0.012;
   double read_noise = 0.4;
@@ -35,6 +39,7 @@ struct CameraModelOptions {
   double glare = 0.02;
   double right_gain = 0.94;
   double stamp_jitter_us = 20;
+  double stamp_noise_us = 0;
   double drop_share = 0;
   double time_offset_ms = 0;
   double later_ms = 0;
@@ -58,6 +63,11 @@ struct CameraModelOptions {
     v("min_exposure_ms", min_exposure_ms, "ms", "shortest exposure", 0.01, 50.0);
     v("max_exposure_ms", max_exposure_ms, "ms", "longest exposure; in less light the gain rises", 0.01, 50.0);
     v("max_gain", max_gain, "", "largest gain; the smallest is 1", 1.0, 100.0);
+    v("gain_step_db", gain_step_db, "dB", "steps of the gain, 0 for none", 0.0, 12.0);
+    v("intervals_ms", intervals_ms, "",
+      "intervals between images that the exposure control changes between, in ms, apart by commas: the longest exposure grows "
+      "with the interval; empty: always that of image_rate_hz");
+    v("interval_for_s", interval_for_s, "s", "how long an interval stays", 0.1, 1e4);
     v("sensitivity", sensitivity, "1/ms", "grey value of radiance 1 after one millisecond at gain 1", 0.1, 10000.0);
     v("shot_noise", shot_noise, "", "variance of the grey value per grey value and gain", 0.0, 5.0);
     v("read_noise", read_noise, "", "standard deviation in grey values at gain 1", 0.0, 50.0);
@@ -67,6 +77,7 @@ struct CameraModelOptions {
     v("glare", glare, "", "share of the light that the lens scatters over the image", 0.0, 0.9);
     v("right_gain", right_gain, "", "the right camera's brightness, relative to the left's", 0.1, 10.0);
     v("stamp_jitter_us", stamp_jitter_us, "us", "jitter of the right image's stamp, standard deviation", 0.0, 2000.0);
+    v("stamp_noise_us", stamp_noise_us, "us", "noise of the stamps of all images of a frame, standard deviation", 0.0, 1e4);
     v("drop_share", drop_share, "", "share of stereo frames that are lost", 0.0, 0.9);
     v("time_offset_ms", time_offset_ms, "ms", "IMU stamp less image stamp of the same instant", -100.0, 100.0);
     v("later_ms", later_ms, "ms",
@@ -86,6 +97,8 @@ class ImageSensor {
   /// Exposure time of the next image.
   double exposure_s() const { return exposure_ms_ * 1e-3; }
   double gain() const { return gain_; }
+  /// The exposure of the next image may be longer by this factor than the options say.
+  void allow_longer(double factor);
   /// Sets exposure and gain to the values that they settle at for this radiance.
   void settle(const std::vector<float>& radiance);
   /// Image of the radiance (row by row, changed in place). `frame` seeds the noise.
@@ -95,12 +108,13 @@ class ImageSensor {
   void blur(std::vector<float>& image);
   void add_glare(std::vector<float>& image) const;
   void follow(double mean_radiance, double share);
+  void divide_product();
 
   CameraModelOptions options_;
   int width_, height_;
   double brightness_;
   std::uint64_t seed_;
-  double exposure_ms_, gain_ = 1, log_product_;
+  double exposure_ms_, gain_ = 1, log_product_, longer_ = 1;
   std::vector<float> falloff_, rows_;
   double lit_pixels_ = 1;  // of an image
 };

@@ -22,6 +22,7 @@ struct ImuModelOptions {
   double turn_on_accel_bias_mps2 = 0.2;
   double scale_error = 0.001;
   double misalignment_rad = 0.001;
+  double accel_crookedness = 1;
   double vibration_accel_mps2 = 0.25;
   double vibration_gyro_radps = 0.01;
   double rumble_accel_mps2_rthz = 0.03;
@@ -30,6 +31,7 @@ struct ImuModelOptions {
   double accel_range_mps2 = 176.0;
   double gyro_step_radps = 1.745e-4;
   double accel_step_mps2 = 8.17e-3;
+  double stamp_jitter_us = 0;
 
   template <class V>
   void visit(V&& v) {
@@ -38,6 +40,8 @@ struct ImuModelOptions {
     v("turn_on_accel_bias_mps2", turn_on_accel_bias_mps2, "m/s^2", "standard deviation of the bias at the start", 0.0, 5.0);
     v("scale_error", scale_error, "", "standard deviation of each axis' scale, 0.001 is 0.1 %", 0.0, 0.1);
     v("misalignment_rad", misalignment_rad, "rad", "standard deviation of each axis' direction", 0.0, 0.1);
+    v("accel_crookedness", accel_crookedness, "", "the accelerometer's errors of scale and direction beside the gyroscope's", 0.0,
+      100.0);
     v("vibration_accel_mps2", vibration_accel_mps2, "m/s^2", "rotors in flight: standard deviation on each axis", 0.0, 50.0);
     v("vibration_gyro_radps", vibration_gyro_radps, "rad/s", "rotors in flight: standard deviation on each axis", 0.0, 5.0);
     v("rumble_accel_mps2_rthz", rumble_accel_mps2_rthz, "m/s^2/sqrt(Hz)", "rotors in flight: density of broadband noise", 0.0,
@@ -48,6 +52,8 @@ struct ImuModelOptions {
     v("accel_range_mps2", accel_range_mps2, "m/s^2", "readings saturate here", 1.0, 10000.0);
     v("gyro_step_radps", gyro_step_radps, "rad/s", "quantisation step, 0 for none", 0.0, 0.1);
     v("accel_step_mps2", accel_step_mps2, "m/s^2", "quantisation step, 0 for none", 0.0, 1.0);
+    v("stamp_jitter_us", stamp_jitter_us, "us", "noise of the readings' stamps, standard deviation, less than half an interval", 0.0,
+      1e4);
   }
 };
 

@@ -24,6 +24,31 @@
 
 namespace fbvins {
 
+/// What the calibration that a recording is written with is wrong by, and does not say: standard deviations.
+struct CalibrationErrorOptions {
+  double focal_share = 0;
+  double centre_px = 0;
+  double mounting_deg = 0;
+  double place_mm = 0;
+  double imu_noise_factor = 1;
+  double imu_rate_share = 0;
+  bool without_distortion = false;
+  bool without_line_delay = false;
+  bool operator==(const CalibrationErrorOptions&) const = default;
+
+  template <class V>
+  void visit(V&& v) {
+    v("focal_share", focal_share, "", "error of each camera's focal length, 0.01 is 1 %", 0.0, 0.2);
+    v("centre_px", centre_px, "px", "error of each principal point", 0.0, 50.0);
+    v("mounting_deg", mounting_deg, "deg", "error of the rotation between cameras and IMU, about each axis", 0.0, 45.0);
+    v("place_mm", place_mm, "mm", "error of the cameras' place on the IMU, along each axis", 0.0, 500.0);
+    v("imu_noise_factor", imu_noise_factor, "", "declared noise densities over the true ones", 1e-3, 1e3);
+    v("imu_rate_share", imu_rate_share, "", "the declared rate of the IMU is higher by this share of the true one", -0.5, 0.5);
+    v("without_distortion", without_distortion, "", "the calibration has no distortion");
+    v("without_line_delay", without_line_delay, "", "the calibration has no line delay");
+  }
+};
+
 /// A recorded flight in place of a synthetic one.
 struct RecordedOptions {
   std::string trajectory = "";
@@ -44,11 +69,13 @@ struct SimulationOptions {
   int seed = 1;
   double image_rate_hz = 20;
   std::string calibration = "";
+  std::string sensors = "none";
   std::string rig = "stereo";
   FlightOptions flight;
   RecordedOptions recorded;
   ImuModelOptions imu;
   CameraModelOptions camera;
+  CalibrationErrorOptions calibration_error;
   DepthModelOptions depth;
   WorldOptions world;
   LightOptions light;
@@ -58,6 +85,8 @@ struct SimulationOptions {
     v("seed", seed, "", "of all random numbers", 0, 2'000'000'000);
     v("image_rate_hz", image_rate_hz, "Hz", "stereo frames per second", 1.0, 200.0);
     v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
+    v("sensors", sensors, "none|d435i|d435i-colour|oak-d|l515|phone|arducam-fc|adis16448",
+      "whose lenses, mounting and IMU these are, in place of the calibration's; --sensors sets all other figures of theirs, too");
     v("rig", rig, "stereo|mono|quad|sides|rgbd|fisheye|back-to-back",
       "cameras: the two of the calibration; or the left one alone; or two more of the same kind that look backwards, or one to each "
       "side; or the left one with a depth sensor; or two with lenses of 200 degrees, side by side or back to back");
@@ -65,6 +94,7 @@ struct SimulationOptions {
     v.group("recorded", recorded, "a recorded flight instead");
     v.group("imu", imu, "errors of the IMU");
     v.group("camera", camera, "both cameras");
+    v.group("calibration_error", calibration_error, "the calibration that the recording is written with, against the true one");
     v.group("depth", depth, "the depth sensor of the rig rgbd");
     v.group("world", world, "the place");
     v.group("light", light, "the lamps");
@@ -83,6 +113,10 @@ StereoRig euroc_rig();
 /// The rig of the options: their calibration, image rate and time offset.
 Result<StereoRig> simulated_rig(const SimulationOptions& options);
 
+/// What is given to a user as the calibration of `rig`: wrong as the options say, without axes of the IMU. With sensors of a kit
+/// it has no time offset either.
+StereoRig calibrated_rig(const SimulationOptions& options, StereoRig rig);
+
 /// A stereo frame with data that only a simulator has.
 struct RenderedFrame {
   StereoFrame frame;
@@ -95,7 +129,8 @@ class FlightRecorder;
 
 /// A recording that is rendered frame by frame.
 struct Simulation {
-  StereoRig rig;
+  StereoRig rig;                          ///< as it is
+  StereoRig calibrated;                   ///< as the recording's calibration says
   SplineTrajectory flight;
   Time start;
   SimulatedImu imu;
