@@ -206,6 +206,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.standstill = standstill;
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.make_newest_keyframe(stats.keyframe);
+  if (time_alignment_.settling()) monitor_.forget_biases();
   monitor_.take({frame.t, window_.newest().state.bias, out.odometry.gyro_bias_covariance, out.odometry.accel_bias_covariance});
   monitor_.take(turns_of(window_.frames()), window_.newest().state.T_FB, dt);
   compare_carried(out.odometry);
@@ -302,7 +303,7 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
 }
 
 bool Estimator::contradicted_too_long(Time t) {
-  if (!one_camera_ || !monitor_.contradicted()) agreed_ = t;
+  if (!one_camera_ || !monitor_.follows_images()) agreed_ = t;
   return (t - agreed_).seconds() > kContradictedOneCamera_s;
 }
 

@@ -49,6 +49,8 @@ class Monitor {
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 
+  /// The readings are cut at other times than before: biases take up the difference.
+  void forget_biases() { tilt_.forget_biases(); }
   /// After each solve: the biases are where a wrong tilt shows, and faults of the IMU that begin without a contradiction.
   void take(const BiasEstimate& biases);
   /// And the turns of the window. `now`: its newest pose, `dt` after the one before.

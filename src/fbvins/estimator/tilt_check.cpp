@@ -63,14 +63,14 @@ bool TiltCheck::take(const BiasEstimate& now, bool contradicted) {
   const double dt_s = biases_.empty() ? 0 : (now.t - biases_.back().t).seconds();
   biases_.push_back(now);
   while ((now.t - biases_.front().t).seconds() > kJump_s) biases_.pop_front();
-  if (refuted_ && (now.t - refuted_->t).seconds() > kRemembered_s) refuted_.reset();
+  if (refuted_ && (now.t - refuted_->t).seconds() > kRemembered_s) refuted_.reset(), before_.reset();
   const BiasEstimate& from = refuted_ ? *refuted_ : biases_.front();
   if (moved(from, now, kAccelJump_mps2, kGyroJump_radps)) doubt(from);
   if (!in_doubt_ || contradicted) return false;
   const bool away = before_ && moved(*before_, now, kAccelBack_mps2, kGyroBack_radps);
   (away ? refuted_s_ : confirmed_s_) += dt_s;
   (away ? confirmed_s_ : refuted_s_) = 0;
-  if (refuted_s_ > kConfirmed_s) {
+  if (refuted_s_ > kConfirmed_s && !refuted_) {  // a second start would be doubted like the first one
     refuted_ = before_;
     return true;
   }

@@ -11,6 +11,8 @@ namespace {
 constexpr int kEachBefore = 2, kEachInFlight = 20;
 /// An offset is corrected where it is certain: by this much, and by so many standard deviations.
 constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
+/// Before the start one that was found is improved by less.
+constexpr double kImproved_sigma = 1;
 /// In flight so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
 /// A line delay likewise: global shutters stay what they are.
@@ -19,8 +21,6 @@ constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4;
 constexpr Duration kStep{4'000'000};
 /// Noise of stamps below this is not told from none where tracks are few, and harms less than readings that count for less.
 constexpr double kNoJitter_s = 0.0007;
-/// A window that began with another offset has forgotten it after this time.
-constexpr double kForgotten_s = 3;
 
 }  // namespace
 
@@ -48,7 +48,8 @@ void TimeAlignment::solve(bool running) {
   solves_ = std::min(solves_ + 1, kSolvesOfNoise);
   jitter_s_ += (found->stamp_sigma_s - jitter_s_) / solves_;
   const double off_s = std::abs(found->time_offset_s() - found_.seconds());
-  off_ = off_s > kLeast_s && off_s > kCertain_sigma * found->time_offset_sigma_s() ? off_ + 1 : 0;
+  const double certain = running || found_ == Duration{} ? kCertain_sigma : kImproved_sigma;
+  off_ = off_s > kLeast_s && off_s > certain * found->time_offset_sigma_s() ? off_ + 1 : 0;
   if (off_ >= (running ? kInARow : 1))
     found_ = Duration::from_seconds(found->time_offset_s());
   const double line_off_s = std::abs(found->line_delay_s() - line_delay_s_);
@@ -56,9 +57,8 @@ void TimeAlignment::solve(bool running) {
 }
 
 double TimeAlignment::stamp_sigma_s() const {
-  const bool settling = changed_ && (now_ - *changed_).seconds() < kForgotten_s;
   const double jitter_s = std::sqrt(std::max(0.0, jitter_s_ * jitter_s_ - kNoJitter_s * kNoJitter_s));
-  return std::hypot(jitter_s, settling ? std::max(0.002, std::abs((found_ - correction_).seconds())) : 0.0);
+  return std::hypot(jitter_s, settling() ? std::max(0.002, std::abs((found_ - correction_).seconds())) : 0.0);
 }
 
 }  // namespace fbvins

@@ -24,12 +24,15 @@ class TimeAlignment {
   /// Whether enough was seen to notice an offset that would spoil a start in motion.
   bool known() const { return !enabled_ || alignment_.pairs() >= kFewestForStart || frames_ >= kLongestWait; }
   Duration correction() const { return correction_; }
+  /// It has changed, so lately that the window still has images of before.
+  bool settling() const { return changed_ && (now_ - *changed_).seconds() < kForgotten_s; }
   /// What the line delay of the rig's shutters is corrected by.
   double line_delay_correction_s() const { return line_delay_s_; }
   /// Standard deviation of when an image was taken: the noise of its stamp, and what the offset is known to be wrong by.
   double stamp_sigma_s() const;
 
  private:
+  static constexpr double kForgotten_s = 3;
   /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
   static constexpr int kFewestForStart = 8;
   /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
