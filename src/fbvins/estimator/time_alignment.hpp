@@ -4,7 +4,7 @@
 // (docs/derivations/gyro_alignment.md, Y6-Y8).
 //
 //   TimeAlignment alignment(rig, true);
-//   if (alignment.add(frame, running)) restart_the_start();       // frames from here on are cut by another offset
+//   if (alignment.add(frame, running)) initialiser.reset();       // frames from here on are cut by another offset
 //   apply(alignment.correction());                                // two images later: the feedback's way
 //
 // One owner, one thread.
