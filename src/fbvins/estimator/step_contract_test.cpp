@@ -119,7 +119,7 @@ TEST(Level, IsReportedWhenTheTiltIsKnown) {
     was_level = was_level || o.level;
   }
   EXPECT_TRUE(was_level);
-  EXPECT_GT(unknown, 10) << "not before";
+  EXPECT_GT(unknown, 5) << "not before";
 }
 
 TEST(ImuState, BiasesOfTheFlightBeforeMakeTheStartLevel) {

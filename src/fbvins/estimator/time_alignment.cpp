@@ -45,6 +45,7 @@ bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
 void TimeAlignment::solve(bool running) {
   const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
   if (!found) return;
+  sigma_s_ = found->time_offset_sigma_s();
   solves_ = std::min(solves_ + 1, kSolvesOfNoise);
   jitter_s_ += (found->stamp_sigma_s - jitter_s_) / solves_;
   const double off_s = std::abs(found->time_offset_s() - found_.seconds());

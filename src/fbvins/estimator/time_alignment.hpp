@@ -22,7 +22,10 @@ class TimeAlignment {
   /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight.
   bool add(const TrackedFrame& frame, bool running);
   /// Whether enough was seen to notice an offset that would spoil a start in motion.
-  bool known() const { return !enabled_ || alignment_.pairs() >= kFewestForStart || frames_ >= kLongestWait; }
+  bool known() const {
+    const bool precise = alignment_.pairs() >= kFewestForStart && sigma_s_ < kPreciseForStart_s;
+    return !enabled_ || precise || alignment_.pairs() >= kEnoughForStart || frames_ >= kLongestWait;
+  }
   Duration correction() const { return correction_; }
   /// It has changed, so lately that the window still has images of before.
   bool settling() const { return changed_ && (now_ - *changed_).seconds() < kForgotten_s; }
@@ -34,7 +37,8 @@ class TimeAlignment {
  private:
   static constexpr double kForgotten_s = 3;
   /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
-  static constexpr int kFewestForStart = 8;
+  static constexpr int kFewestForStart = 8, kEnoughForStart = 24;
+  static constexpr double kPreciseForStart_s = 0.004;
   /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
   static constexpr int kLongestWait = 40;
   void solve(bool running);
@@ -44,7 +48,7 @@ class TimeAlignment {
   GyroAlignment alignment_;
   int frames_ = 0;
   Duration correction_{}, found_{};
-  double line_delay_s_ = 0, jitter_s_ = 0;
+  double line_delay_s_ = 0, jitter_s_ = 0, sigma_s_ = 1;
   int solves_ = 0, off_ = 0;  ///< and those in a row that found the offset off
   std::optional<Time> changed_;  ///< the correction, last
   Time now_;

@@ -14,7 +14,7 @@ using test::EstimatedFlight;
 using test::Motion;
 using test::SimulatedFlight;
 
-constexpr int kFrom = 100, kTo = 145, kEnd = 360;
+constexpr int kFrom = 100, kTo = 145, kEnd = 260;
 /// Images that end as long after the drift has begun, and begin again after its end.
 constexpr int kDark = 25, kSeenAgain = 60;
 
@@ -61,7 +61,7 @@ TEST(WrongReadings, AGyroscopeThatDriftsIsSeenBeforeItHasMovedThePoseFar) {
 
 /// A start may be as wrong as what ended the window before.
 TEST(WrongReadings, AfterARestartInAContradictionImagesAndReadingsHaveToAgreeForASecond) {
-  const Flown flown = fly_with_drift(Vec3(-0.06, 0, 0), true);
+  const Flown flown = fly_with_drift(Vec3(-0.03, 0, 0), true);
   const auto is = [](HealthState state) { return [state](const Odometry& o) { return o.health.state == state; }; };
   const auto lost = std::find_if(flown.odometry.begin(), flown.odometry.end(), is(HealthState::lost));
   ASSERT_NE(lost, flown.odometry.end());
