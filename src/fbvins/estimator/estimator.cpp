@@ -71,7 +71,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
   const TrackedFrame& whole = contract_.enforced(tracked);
   if (time_alignment_.add(whole, running_) && !running_) initialiser_.reset();
-  exposures_.correct_line_delay(time_alignment_.line_delay_correction_s());
+  if (!options_.estimate_line_delay) exposures_.correct_line_delay(time_alignment_.line_delay_correction_s());
   const bool as_it_is = exposures_.at_stamp(whole) && !options_.estimate_line_delay;
   if (!as_it_is) referred_ = refer_to_stamp(whole);
   const TrackedFrame& frame = as_it_is ? whole : referred_;

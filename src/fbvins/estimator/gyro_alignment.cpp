@@ -43,6 +43,8 @@ constexpr double kLeastRms = 0.4;
 /// the second in the median.
 constexpr double kLateShows_s = 0.004, kLateUsual_s = 0.0007;
 constexpr std::size_t kFewestLate = 10;
+/// One standard deviation of the variance by the median of so many differences is this over the root of their number.
+constexpr double kSurely = 2.3;
 
 using Vec8 = GyroAlignmentEstimate::Vec;
 
@@ -60,7 +62,8 @@ double stamp_sigma(const std::vector<LateImage>& late) {
   }
   if (difference_s.size() < kFewestLate) return 0;
   const double sigma = 1.4826 * median(difference_s), usual = 1.4826 * kLateUsual_s;
-  return std::sqrt(std::max(0.0, sigma * sigma - usual * usual - median(known_s2)) / 6);
+  const double surely = 1 - kSurely / std::sqrt(static_cast<double>(difference_s.size()));
+  return std::sqrt(std::max(0.0, surely * sigma * sigma - usual * usual - median(known_s2)) / 6);
 }
 
 /// The body between two images.
