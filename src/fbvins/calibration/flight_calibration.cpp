@@ -204,7 +204,8 @@ std::vector<FlightQuestion> questions(const std::vector<FlightGroup>& rough) {
   const auto may_change = [&](FlightGroup group) { return rough.empty() || std::ranges::find(rough, group) != rough.end(); };
   FlightQuestion question;
   question.rough = !rough.empty();
-  for (const FlightGroup group : {lever, mounting, time_offset, baseline, between_cameras, focal, centre, distortion})
+  for (const FlightGroup group :
+       {lever, mounting, time_offset, gyro_axes, accel_axes, baseline, between_cameras, focal, centre, distortion})
     if (!may_change(group)) question.left.push_back(group);
   std::vector<FlightQuestion> out{question};
   for (const FlightGroup group : {distortion, centre, focal}) {
