@@ -139,7 +139,7 @@ std::string rectified_topics(const BagContents& contents, const ChosenTopics& to
     const BagCamera* camera = camera_for(contents, topic);
     const auto* rectified = camera ? rectified_of(*camera, topic) : nullptr;
     if (rectified &&
-        (!rectified->R_rectified_raw.isIdentity(0) || camera->camera.intrinsics() != rectified->camera.intrinsics() ||
+        (rectified->R_rectified_raw != Mat3::Identity() || camera->camera.intrinsics() != rectified->camera.intrinsics() ||
          camera->camera.distortion() != rectified->camera.distortion()))
       said.push_back(printable(topic));
   }
