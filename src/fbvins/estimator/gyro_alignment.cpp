@@ -32,6 +32,8 @@ constexpr double kDepths = 3, kMostParallax = 0.5;
 constexpr int kParallaxIterations = 4;
 /// Offsets from which the search begins: closer together than a quarter of the fastest motion of a hand, 5 Hz.
 constexpr double kStarts_s[] = {0, -0.04, 0.04, -0.08, 0.08};
+/// With more pairs a search costs too much for one image; the last solution is improved.
+constexpr std::size_t kMostSearched = 24;
 /// From here on the minimum is known.
 constexpr double kSettled_s = 0.002;
 /// The tracks of two images share what is left of the readings' noise and of the lens: the covariance of independent ones is too
@@ -329,7 +331,7 @@ GyroAlignmentEstimate GyroAlignment::solve_from(const Vec8& x) const {
 std::optional<GyroAlignmentEstimate> GyroAlignment::solve() {
   if (pairs_.empty()) return std::nullopt;
   GyroAlignmentEstimate best = solve_from(last_);
-  if (!settled_) {
+  if (!settled_ && pairs_.size() <= kMostSearched) {
     for (const double start : kStarts_s) {
       Vec8 x = Vec8::Zero();
       x(3) = start;

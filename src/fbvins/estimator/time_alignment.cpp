@@ -7,7 +7,7 @@
 namespace fbvins {
 namespace {
 
-/// Solved after so many images: before the first start, and in flight.
+/// Solved after so many images: before the first start, while pairs are few, and otherwise.
 constexpr int kEachBefore = 2, kEachInFlight = 20;
 /// An offset is corrected where it is certain: by this much, and by so many standard deviations.
 constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
@@ -35,7 +35,8 @@ bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   const bool changed = cut_by_ && std::abs((frame.imu.time_offset - *cut_by_).seconds()) > kStep.seconds();
   cut_by_ = frame.imu.time_offset;
   alignment_.add(frame, given_);
-  if (++frames_ % (running ? kEachInFlight : kEachBefore) == 0) solve(running);
+  const bool few = !running && alignment_.pairs() <= kEnoughForStart;
+  if (++frames_ % (few ? kEachBefore : kEachInFlight) == 0) solve(running);
   if (correction_ != found_) changed_ = now_;
   const Duration missing = found_ - correction_;
   correction_ = running ? correction_ + std::clamp(missing, -kStep, kStep) : found_;
