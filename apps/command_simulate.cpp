@@ -67,7 +67,7 @@ Result<void> write_options(SimulationOptions options, const std::string& folder)
   return write_file_atomically(folder + "/simulation.yaml", write_yaml(fields_of(options)));
 }
 
-/// The rig as it is, in Kalibr's form: what a calibration would have to find. Biases move, and are in the truth beside the poses.
+/// The true calibration, in Kalibr's form. Biases change with time: they are in the ground truth, with the poses.
 Result<void> write_true_calibration(const Simulation& simulation, const std::string& folder) {
   StereoRig rig = simulation.rig;
   rig.imu_noise.axes.gyro = simulation.imu.gyro_axes, rig.imu_noise.axes.accel = simulation.imu.accel_axes;

@@ -45,7 +45,7 @@ constexpr double kLeastRms = 0.4;
 /// the second in the median.
 constexpr double kLateShows_s = 0.004, kLateUsual_s = 0.0007;
 constexpr std::size_t kFewestLate = 10;
-/// One standard deviation of the variance by the median of so many differences is this over the root of their number.
+/// Relative standard deviation of the variance by the median of n differences: this over the root of n. It is subtracted.
 constexpr double kSurely = 2.3;
 
 using Vec8 = GyroAlignmentEstimate::Vec;
