@@ -34,7 +34,8 @@ double mean_normalised_error(bool known_landmarks) {
 }
 
 TEST(Estimator, CovarianceIsConsistent) {
-  const double nees = mean_normalised_error(false);  // 6 when consistent
+  // 6 when consistent, 3.1 here: flights start when the window is full, and the gauge is then known better than it says.
+  const double nees = mean_normalised_error(false);
   EXPECT_GT(nees, 2.5);
   EXPECT_LT(nees, 9.0);
 }
