@@ -112,7 +112,7 @@ Result<Flight> run_flight(const FlightArguments& arguments, const Config& config
 
 RunSummary summarise(const Flight& flight, const Dataset& data, const Config& config, const FlightArguments& arguments) {
   RunSummary summary = summarise(flight.run, data);
-  if (flight.map) summary.map = summarise(*flight.map, flight.run, truth_of(data));
+  if (flight.map) summary.map = summarise(*flight.map, flight.run, truth_of(data, time_offset_found_s(flight.run)));
   if (summary.map) summary.map->loaded = arguments.map.load;
   summary.frontend = config.frontend.kind;
   if (summary.frontend == "boost") summary.booster_weights = booster_weights_path(config.frontend.boost.booster.weights);

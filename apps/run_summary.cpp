@@ -145,16 +145,21 @@ std::string label_of(const Health& health) {
   return fmt::format("{}/{}", to_string(health.state), to_string(health.reason));
 }
 
-Trajectory<W> truth_of(const Dataset& data) {
+double time_offset_found_s(const RunRecord& record) {
+  return record.odometry.empty() ? 0 : record.odometry.back().time_offset_s;
+}
+
+Trajectory<W> truth_of(const Dataset& data, double found_s) {
+  const Duration offset = Duration::from_seconds(data.rig().time_offset_s + found_s);
   Trajectory<W> truth;
-  for (const TrajectoryPoint& point : data.ground_truth()) truth.push_back({point.t, point.T_WB});
+  for (const TrajectoryPoint& point : data.ground_truth()) truth.push_back({point.t - offset, point.T_WB});
   return truth;
 }
 
 RunSummary summarise(const RunRecord& record, const Dataset& data) {
   std::vector<Time> images;
   for (const FrameEntry& frame : data.frames()) images.push_back(frame.t);
-  RunSummary s = summarise(record, std::move(images), truth_of(data));
+  RunSummary s = summarise(record, std::move(images), truth_of(data, time_offset_found_s(record)));
   s.dataset = data.info().name;
   s.images_bad = data.info().left.images.bad() + data.info().right.images.bad();
   return s;

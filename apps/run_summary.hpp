@@ -49,8 +49,11 @@ struct RunSummary {
 std::string label_of(const Health& health);
 /// Of this process so far.
 double peak_memory_mb();
-/// The recording's ground truth as a trajectory; empty where there is none.
-Trajectory<W> truth_of(const Dataset& data);
+/// Besides that of the calibration, at the end.
+double time_offset_found_s(const RunRecord& record);
+/// The recording's ground truth as a trajectory; empty where there is none. It is on the IMU's clock, poses are on the images':
+/// the calibration's time offset, and what the run found besides, lie between them.
+Trajectory<W> truth_of(const Dataset& data, double found_s = 0);
 RunSummary summarise(const RunRecord& record, const Dataset& data);
 /// The same without a recording: stamps of all images, and the truth, which may be empty.
 RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Trajectory<W>& truth);
