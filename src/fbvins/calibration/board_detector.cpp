@@ -8,6 +8,7 @@
 #include "fbvins/calibration/corner_refine.hpp"
 #include "fbvins/calibration/grid_fill.hpp"
 #include "fbvins/calibration/grid_tags.hpp"
+#include "fbvins/calibration/tag_search.hpp"
 
 namespace fbvins {
 namespace {
@@ -31,29 +32,24 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
         fmt::format("only AprilGrids are found in images: record one that `fbvins target` prints, or give the corners of this "
                     "{} by --detections",
                     board.kind == BoardKind::charuco ? "ChArUco board" : "chessboard")};
-  Result<TagDetector> detector = TagDetector::create({kLibraryBorder, kKalibrBorder});
-  if (!detector) return detector.error();
-  std::vector<TagCells> all;
-  for (int id = 0; id < board.columns * board.rows; ++id) {
-    const Result<TagCells> cells = tag_cells(id);
-    if (!cells) return cells.error();
-    all.push_back(*cells);
-  }
-  return BoardDetector(board, std::move(all), *std::move(detector));
+  if (const Result<TagCells> last = tag_cells(board.columns * board.rows - 1); !last) return last.error();
+  Result<TagReader> reader = TagReader::create(board.spacing);
+  if (!reader) return reader.error();
+  return BoardDetector(board, *std::move(reader));
 }
 
 BoardDetection BoardDetector::find(const ImageView& image) {
   BoardDetection out;
-  GridTags seen = tags_of_grid(board_, detector_.find(image, board_.columns * board_.rows / 2));
-  if (seen.twice == 0) seen.tags = with_missing_tags(board_, cells_, image, std::move(seen.tags));
+  GridTags seen = tags_of_grid(board_, search_tags(image, reader_, board_.columns * board_.rows));
+  if (seen.twice == 0) seen.tags = with_missing_tags(board_, reader_, image, std::move(seen.tags));
   out.tags = static_cast<int>(seen.tags.size());
   out.foreign_tags = seen.foreign;
   out.twice = seen.twice;
   for (const TagDetection& tag : seen.tags) {
     const double side_px = shortest_side_px(tag);
     if (side_px < kSmallestTag_px) continue;
-    // The search must not reach another edge: the border's inner edge is one border width away, that of the squares between the tags its
-    // own width.
+    // The search must not reach another edge: the border's inner edge is one border width away, that of the squares between the
+    // tags its own width.
     const double border = static_cast<double>(tag.border) / cells_across(tag.border);
     const double radius_px = std::clamp(side_px * std::min(border, board_.spacing), 2.0, kLargestRadius_px);
     for (int k = 0; k < 4; ++k)
@@ -67,7 +63,7 @@ BoardDetection BoardDetector::find(const ImageView& image) {
 bool BoardDetector::finds_mirrored(const ImageView& image) {
   Image mirrored(image.width, image.height);
   for (int y = 0; y < image.height; ++y) std::reverse_copy(image.row(y), image.row(y) + image.width, mirrored.row(y));
-  const GridTags seen = tags_of_grid(board_, detector_.find(mirrored.view(), 3));
+  const GridTags seen = tags_of_grid(board_, search_tags(mirrored.view(), reader_, 3));
   return static_cast<int>(seen.tags.size()) + seen.foreign >= 3;
 }
 

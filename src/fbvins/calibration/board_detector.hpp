@@ -9,7 +9,7 @@
 
 #include "fbvins/calibration/board.hpp"
 #include "fbvins/calibration/board_view.hpp"
-#include "fbvins/calibration/tag_family.hpp"
+#include "fbvins/calibration/tag_reading.hpp"
 
 namespace fbvins {
 
@@ -30,12 +30,10 @@ class BoardDetector {
   bool finds_mirrored(const ImageView& image);
 
  private:
-  BoardDetector(const Board& board, std::vector<TagCells> cells, TagDetector detector)
-      : board_(board), cells_(std::move(cells)), detector_(std::move(detector)) {}
+  BoardDetector(const Board& board, TagReader reader) : board_(board), reader_(std::move(reader)) {}
 
   Board board_;
-  std::vector<TagCells> cells_;  ///< of each of its tags
-  TagDetector detector_;
+  TagReader reader_;
 };
 
 }  // namespace fbvins

@@ -19,7 +19,7 @@ const Board kBoard{.columns = 4, .rows = 3, .size_m = 0.088, .spacing = 0.3};
 
 struct Found {
   double rms_px = 0, bias_px = 0;
-  int corners = 0, visible = 0;
+  int corners = 0, visible = 0;  ///< visible: of tags that lie in the image and are large enough
 };
 
 /// Renders the board at random poses and compares what is found with the exact projection.
@@ -34,9 +34,14 @@ Found compare(const Camera& camera, int border, const BoardImageOptions& options
     const Pose<C0, T> T_C0T = random_board_pose(rig, 0, kBoard, rng, 0.7);
     const Pose<Cn, T> T_CnT(T_C0T.q, T_C0T.p);
     const Image image = renderer.render({T_CnT}, options, rng);
-    for (int k = 0; k < kBoard.corner_count(); ++k) {
-      const auto p = camera.project(T_CnT * kBoard.corner(k));
-      out.visible += p && camera.inside(*p, 8);
+    for (int first = 0; first < kBoard.corner_count(); first += 4) {
+      double side_px = 1e9;
+      for (int k = 0; k < 4; ++k) {
+        const auto p = camera.project(T_CnT * kBoard.corner(first + k)),
+                   q = camera.project(T_CnT * kBoard.corner(first + (k + 1) % 4));
+        side_px = p && q && camera.inside(*p, 8) ? std::min(side_px, (*p - *q).norm()) : 0;
+      }
+      out.visible += side_px > 18 ? 4 : 0;
     }
     for (const BoardCorner& corner : detector.find(image.view()).corners) {
       const Vec2 error = corner.pixel - *camera.project(T_CnT * kBoard.corner(corner.index));
@@ -54,9 +59,7 @@ TEST(BoardDetector, CornersAreFoundToASmallPartOfAPixel) {
   for (const int border : {kLibraryBorder, kKalibrBorder})
     for (const std::size_t kind : {0u, 1u}) {
       const Found found = compare(example_cameras()[kind], border, {}, 5 + kind);
-      // In one of the fisheye's two images no cell of Kalibr's tags has two pixels.
-      EXPECT_GT(found.corners, (kind == 1 && border == kKalibrBorder ? 0.25 : 0.5) * found.visible)
-          << kind << ", border " << border;
+      EXPECT_GT(found.corners, (kind == 1 ? 0.7 : 0.95) * found.visible) << kind << ", border " << border;
       EXPECT_LT(found.rms_px, 0.04) << kind << ", border " << border;
       EXPECT_LT(found.bias_px, 0.02) << kind << ", border " << border;
     }
@@ -112,9 +115,8 @@ TEST(BoardDetector, SmallTagsAreFoundBesideOthers) {
   Rng rng(4);
   const Pose<Cn, T> T_CnT(Quat(0, 1, 0, 0) * so3_exp(Vec3(0.1, 0.2, 0.1)), Vec3(-0.3, 0.3, 0.75));
   const Image image = BoardCamera(camera, *BoardPattern::create(board, kKalibrBorder)).render({T_CnT}, {}, rng);
-  const std::vector<TagDetection> alone = TagDetector::create({kKalibrBorder})->find(image.view(), 18);
   const BoardDetection seen = BoardDetector::create(board)->find(image.view());
-  EXPECT_GT(seen.tags, 30) << alone.size() << " by themselves";
+  EXPECT_GT(seen.tags, 30);
   for (const BoardCorner& corner : seen.corners)
     EXPECT_LT((corner.pixel - *camera.project(T_CnT * board.corner(corner.index))).norm(), 0.3) << corner.index;
 }

@@ -19,16 +19,19 @@ constexpr int kFewestViews = 6;
 constexpr double kLeastBaseline_m = 1e-3;  ///< as every reader of calibrations demands it
 /// Of the focal length near the axis; and where images contradict one another, which is said and in the standard deviations.
 constexpr double kLargestFocalSigma = 5e-3, kLargestOfContradicting = 1e-2;
+/// No corner of a printed board is better than this, whatever residuals say.
+constexpr double kLeastCornerNoise_px = 0.03;
 constexpr double kLargestCentreSigma = 5e-3;  ///< of the image's width
 constexpr double kNoticedScatter = 1.5;
 
-/// Relative deviation of the focal length near the axis: of ds and omni not the parameter, but f / (1 + xi).
+/// Relative deviation of the focal length near the axis, by corners that are not too good to be true: of ds and omni not the
+/// parameter, but f / (1 + xi).
 double axial_focal_sigma(const CameraCalibration& found, int camera) {
   const LensModel& lens = found.cameras[camera].camera.model();
   const auto first = std::ranges::find(found.names, fmt::format("cam{}.fx", camera)) - found.names.begin();
   const Eigen::RowVectorXd J = straight_jacobian(lens).row(0);
   const double square = J.dot(found.covariance.block(first, first, J.size(), J.size()) * J.transpose());
-  return std::sqrt(square) / straight_parameters(lens)[0];
+  return std::max(1.0, kLeastCornerNoise_px / found.noise_px) * std::sqrt(square) / straight_parameters(lens)[0];
 }
 
 std::string contradiction_of(const CameraCalibration& found) {

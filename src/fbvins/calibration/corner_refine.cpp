@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kIterations = 25;
 constexpr double kConverged_px = 1e-3;
+constexpr double kConvergedCost = 0.02;  ///< part of the cost
 constexpr double kLargestMove_px = 0.7;  ///< by which the window may be off the corner
 constexpr double kLeastContrast = 6;     ///< half the difference of the fields, grey values
 constexpr double kLargestMisfit = 0.3;   ///< root mean square of the residuals, as a part of the contrast
@@ -105,15 +106,17 @@ bool fit(Crossing& m, const std::vector<Sample>& samples) {
       const Vec7 step = damped.ldlt().solve(b);
       const Crossing trial = m.moved(step);
       const double next = cost_of(trial, samples);
+      const bool stays = step.head<2>().norm() < kConverged_px;
       if (next <= cost) {
+        // A corner that starts where it is stays while blur and greys are found.
+        const bool converged = stays && next >= (1 - kConvergedCost) * cost;
         m = trial;
         cost = next;
         lambda *= 0.1;
-        if (step.head<2>().norm() < kConverged_px) return true;
+        if (converged) return true;
         break;
       }
-      if (step.head<2>().norm() < kConverged_px) return true;
-      if (retry == 6) return false;
+      if (retry == 6) return stays;
       lambda *= 10;
     }
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which of the tags found in an image are those of an AprilGrid: that lie to one another as their numbers say. Pure function.
 //
-//   GridTags seen = tags_of_grid(board, detector.find(image, 18));
+//   GridTags seen = tags_of_grid(board, search_tags(image, reader, 36));
 #pragma once
 
 #include <vector>

@@ -29,26 +29,22 @@ bool is_black(const TagCells& cells, int border, int row, int column);
 struct TagDetection {
   int id = 0;
   int border = kLibraryBorder;  ///< with which it was read
-  int wrong_cells = 0;          ///< of the pattern, 0 or 1
+  int wrong_cells = 0;          ///< of the pattern
   /// Of the black square: bottom left, bottom right, top right, top left of the upright tag; centre of the first pixel at (0, 0).
   std::array<Vec2, 4> corners;
 };
 
-/// One thread at a time.
+/// Of tags that stand alone, with white around, and have a border of one cell; those of a board are another matter
+/// (tag_search.hpp). One thread at a time.
 class TagDetector {
  public:
-  /// For the borders that tags may have here: one, or both, where they are read with each.
-  static Result<TagDetector> create(const std::vector<int>& borders = {kLibraryBorder});
+  static Result<TagDetector> create();
   TagDetector(TagDetector&&) noexcept;
   TagDetector& operator=(TagDetector&&) noexcept;
   ~TagDetector();
 
-  /// By id; corners to about a pixel. Where fewer than `enough` are found in one way, another one is tried. A tag may be there
-  /// once for each border, and with a wrong number: a border of two cells is read as one of one by luck (grid_tags.hpp).
-  std::vector<TagDetection> find(const ImageView& image, int enough);
-  /// The same of tags that stand alone, with white around: corners to some tenths of a pixel, where the lines along the edges
-  /// meet.
-  std::vector<TagDetection> find_alone(const ImageView& image);
+  /// By id; corners to some tenths of a pixel, where the lines along the edges meet.
+  std::vector<TagDetection> find(const ImageView& image);
 
  private:
   struct State;

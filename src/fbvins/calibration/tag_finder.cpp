@@ -114,7 +114,7 @@ std::optional<TagAnchor> TagFinder::posed(const TagDetection& seen, const ImageV
 std::vector<TagAnchor> TagFinder::find(const StereoFrame& frame) {
   std::vector<TagAnchor> out;
   if (!frame.left) return out;
-  const std::vector<TagDetection> all = detector_.find_alone(frame.left->view());
+  const std::vector<TagDetection> all = detector_.find(frame.left->view());
   for (const TagDetection& seen : all) {
     const auto of_id = std::ranges::count(all, seen.id, &TagDetection::id);
     if (of_id > 1 || !survey_.T_AT.contains(seen.id)) continue;
