@@ -238,7 +238,7 @@ std::vector<std::string> remarks_on(const CameraCalibration& found) {
   }
   if (found.scatter > kNoticedScatter) out.push_back(contradiction_of(found));
   if (found.seen_mirrored)
-    out.push_back(
+    out.emplace_back(
         "the board's x and y axes are left-handed in the images, unlike those of a board that `fbvins target` prints: "
         "lenses and extrinsics do not depend on how corners are counted, but with images that are mirrored nothing flies, "
         "and cameras alone cannot tell the two apart (an IMU can)");

@@ -2,7 +2,6 @@
 #include "fbvins/calibration/tag_search.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/calibration/corner_refine.hpp"
 
