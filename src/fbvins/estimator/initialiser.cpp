@@ -25,6 +25,8 @@ constexpr int kFrames = 10;
 constexpr double kMinSpacing_s = 0.045;
 /// With one camera, of which scale and gravity have to be told apart by the accelerations meanwhile.
 constexpr double kMinSpacingOneCamera_s = 0.25;
+/// Where the motion is strong, a second of it is enough, and a cheap IMU's errors are small in it.
+constexpr double kMinSpacingStrong_s = 0.1;
 /// Images of a pair that are taken farther apart show no structure while the velocity is not known: the motion is found like with
 /// one camera.
 constexpr Duration kMostApart = Duration{2'000'000};
@@ -87,6 +89,19 @@ std::optional<LevelStand> stand_of(const StandingOptions& o) {
 
 }  // namespace
 
+void SpacedFrames::add(TrackedFrame frame, double spacing_s) {
+  // With a fast camera the frames would span too short a time: the newest replaces one that is too close to its predecessor.
+  const std::size_t n = frames_.size();
+  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < spacing_s) {
+    frame.imu = joined(std::move(frames_.back().imu), frame.imu);
+    frames_.pop_back();
+  }
+  frames_.push_back(std::move(frame));
+  while (static_cast<int>(frames_.size()) > kFrames) frames_.pop_front();
+}
+
+bool SpacedFrames::full() const { return static_cast<int>(frames_.size()) >= kFrames; }
+
 Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before,
                          bool one_camera)
     : gravity_mps2_(options.gravity_mps2),
@@ -109,10 +124,10 @@ int Initialiser::usable_features(const TrackedFrame& frame, bool at_rest) const 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
                                                     const std::optional<Pose<G, B>>& origin) {
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
-  const bool broken = !frames_.empty() && frame.imu.empty();
+  const bool broken = !frames_.all().empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
   const bool halved =
-      frame.has_left != frame.has_right && !broken && !frames_.empty() && (frame.t - frames_.back().t).seconds() < kLongestSkip_s;
+      frame.has_left != frame.has_right && !broken && !frames_.all().empty() && (frame.t - frames_.all().back().t).seconds() < kLongestSkip_s;
   if (halved && usable_features(frame, at_rest) < kMinFeaturesAtRest) {
     skipped_ = joined(std::move(skipped_), frame.imu);
     readings_.push_back(frame.imu);
@@ -129,7 +144,7 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   if (stand_ && !origin) biases = as_it_stands(biases, at_rest);
   if (at_rest && one_camera_) reason_ = HealthReason::waiting_for_motion_or_rest;  // rest shows no scale
   else if (at_rest) start = start_from_rest(biases);
-  else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(biases, calibration);
+  else if (frames_.full() || near_.full()) start = start_in_motion(biases, calibration);
   else reason_ = HealthReason::waiting_for_motion_or_rest;
   if (start) start->biases = biases;
   if (start && origin) move_to(*origin, *start);
@@ -140,18 +155,11 @@ void Initialiser::remember(const TrackedFrame& frame, bool at_rest) {
   if (!frame.imu.empty()) readings_.push_back(frame.imu);
   while (readings_.size() > 1 && (frame.t - readings_[1].samples.front().t).seconds() >= RestOptions{}.min_window_s)
     readings_.pop_front();
-  // With a fast camera the frames would span too short a time: the newest replaces one that is too close to its predecessor.
-  const std::size_t n = frames_.size();
   TrackedFrame newest = frame;
   newest.imu = joined(std::exchange(skipped_, {}), frame.imu);
   const bool slowly = one_camera_ || (by_one_camera(frame) && !at_rest);
-  const double spacing_s = slowly ? kMinSpacingOneCamera_s : kMinSpacing_s;
-  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < spacing_s) {
-    newest.imu = joined(std::move(frames_.back().imu), newest.imu);
-    frames_.pop_back();
-  }
-  frames_.push_back(std::move(newest));
-  while (static_cast<int>(frames_.size()) > kFrames) frames_.pop_front();
+  if (slowly) near_.add(newest, kMinSpacingStrong_s);
+  frames_.add(std::move(newest), slowly ? kMinSpacingOneCamera_s : kMinSpacing_s);
 }
 
 std::vector<ImuSample> Initialiser::newest_readings() const {
@@ -180,19 +188,16 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
     return std::nullopt;
   }
   rest.state.bias.accel_mps2 = biases.bias.accel_mps2;
-  InitialSolution start{{frames_.begin(), frames_.end()}, std::vector<NavState<G>>(frames_.size(), rest.state), true, {}};
+  InitialSolution start{{frames_.all().begin(), frames_.all().end()}, std::vector<NavState<G>>(frames_.all().size(), rest.state), true, {}};
   leave_out_moving(start.frames);
   return start;
 }
 
 std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration) {
-  if (by_one_camera(frames_.back())) {
-    const std::vector<TrackedFrame> frames(frames_.begin(), frames_.end());
-    std::optional<std::vector<NavState<G>>> states =
-        start_with_one_camera(frames, calibration.T_BC0, noise_, biases, gravity_mps2_);
-    reason_ = HealthReason::alignment_refused;
-    if (!states) return std::nullopt;
-    return InitialSolution{frames, std::move(*states), false, {}};
+  if (by_one_camera(frames_.all().back())) {
+    reason_ = frames_.full() ? HealthReason::alignment_refused : HealthReason::waiting_for_motion_or_rest;
+    std::optional<InitialSolution> start = start_with_one_camera(frames_, biases, calibration);
+    return start ? start : start_with_one_camera(near_, biases, calibration);
   }
   std::vector<Pose<G, B>> poses;
   if (!stereo_structure(calibration, poses)) {
@@ -201,9 +206,9 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimat
   }
   std::vector<Pose<VisualWorld, B>> visual_poses;
   std::vector<Preintegration> between;
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
+  for (std::size_t i = 0; i < frames_.all().size(); ++i) {
     visual_poses.push_back(poses[i].cast_frames<VisualWorld, B>());  // the structure's gauge is arbitrary
-    if (i > 0) between.emplace_back(noise_, ImuBias{}).integrate(frames_[i].imu);
+    if (i > 0) between.emplace_back(noise_, ImuBias{}).integrate(frames_.all()[i].imu);
   }
   AlignmentOptions options;
   options.accel_bias_mps2 = biases.bias.accel_mps2;
@@ -214,7 +219,17 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimat
     reason_ = HealthReason::alignment_refused;
     return std::nullopt;
   }
-  return InitialSolution{{frames_.begin(), frames_.end()}, std::move(alignment.states), false, {}};
+  return InitialSolution{{frames_.all().begin(), frames_.all().end()}, std::move(alignment.states), false, {}};
+}
+
+std::optional<InitialSolution> Initialiser::start_with_one_camera(const SpacedFrames& spaced, const ImuBiasEstimate& biases,
+                                                                  const Calibration& calibration) {
+  if (!spaced.full()) return std::nullopt;
+  const std::vector<TrackedFrame> frames(spaced.all().begin(), spaced.all().end());
+  std::optional<std::vector<NavState<G>>> states =
+      fbvins::start_with_one_camera(frames, calibration.T_BC0, noise_, biases, gravity_mps2_);
+  if (!states) return std::nullopt;
+  return InitialSolution{frames, std::move(*states), false, {}};
 }
 
 bool Initialiser::refine_structure(const Calibration& calibration) {
@@ -232,29 +247,29 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
   poses.assign(1, Pose<G, B>{});
   std::unordered_map<TrackId, Vec3> points;
   structure_.clear();
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
+  for (std::size_t i = 0; i < frames_.all().size(); ++i) {
     if (i > 0) {
       std::vector<LandmarkObservation> observations;
-      for (const TrackedFeature& f : frames_[i].features) {
+      for (const TrackedFeature& f : frames_.all()[i].features) {
         const auto p = points.find(f.id);
         if (p != points.end()) observations.push_back({p->second, &f});
       }
       if (static_cast<int>(observations.size()) < kMinStructureInliers) return false;
       Pose<G, B> guess = poses.back();
-      guess.q = guess.q * integrate_gyro(frames_[i].imu, Vec3::Zero());
+      guess.q = guess.q * integrate_gyro(frames_.all()[i].imu, Vec3::Zero());
       const PoseRefinement refined = refine_pose(observations, calibration, guess);
       if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(observations.size())))
         return false;
       poses.push_back(refined.T_GB);
     }
     Frame f;
-    f.id = frames_[i].id;
-    f.t = frames_[i].t;
+    f.id = frames_.all()[i].id;
+    f.t = frames_.all()[i].t;
     f.state.T_FB = poses.back();
-    structure_.add_frame(std::move(f), frames_[i].features, calibration);
+    structure_.add_frame(std::move(f), frames_.all()[i].features, calibration);
     if (i == 0) structure_.set_prior(held_still());
     // Stereo alone is inaccurate for far points: the motion so far improves them before the next pose needs them.
-    if (i % kFramesPerRefinement == 0 || i + 1 == frames_.size()) {
+    if (i % kFramesPerRefinement == 0 || i + 1 == frames_.all().size()) {
       if (!refine_structure(calibration)) return false;
       for (const LocatedLandmark& l : located_landmarks(structure_, calibration)) points[l.track] = l.p_G;
     } else {

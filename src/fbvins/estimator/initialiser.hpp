@@ -27,6 +27,18 @@ struct InitialSolution {
   ImuBiasEstimate biases;  ///< their prior, before these frames
 };
 
+/// The newest frames that are at least so far apart, with the readings between them.
+class SpacedFrames {
+ public:
+  void add(TrackedFrame frame, double spacing_s);
+  bool full() const;
+  void clear() { frames_.clear(); }
+  const std::deque<TrackedFrame>& all() const { return frames_; }
+
+ private:
+  std::deque<TrackedFrame> frames_;
+};
+
 class Initialiser {
  public:
   /// `before`: the IMU's biases at the end of an earlier flight. `one_camera`: the rig has one only.
@@ -35,6 +47,7 @@ class Initialiser {
 
   void reset() {
     frames_.clear();
+    near_.clear();
     readings_.clear();
     skipped_ = {};
   }
@@ -52,6 +65,8 @@ class Initialiser {
   std::vector<ImuSample> newest_readings() const;
   ImuBiasEstimate as_it_stands(const ImuBiasEstimate& prior, bool at_rest);
   std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
+  std::optional<InitialSolution> start_with_one_camera(const SpacedFrames& frames, const ImuBiasEstimate& biases,
+                                                       const Calibration& calibration);
   std::optional<InitialSolution> start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);
   bool stereo_structure(const Calibration& calibration, std::vector<Pose<G, B>>& poses);
@@ -62,7 +77,7 @@ class Initialiser {
   std::optional<LevelStand> stand_;       ///< before the first start
   std::optional<ImuBiasEstimate> stood_;  ///< as the floor has told them
   bool one_camera_;
-  std::deque<TrackedFrame> frames_;
+  SpacedFrames frames_, near_;       ///< the second with one camera: of a motion that shows the scale sooner
   std::deque<ImuSegment> readings_;  ///< of the last moments, to decide whether the body is at rest
   SlidingWindow structure_;
   WindowSolver solver_;
