@@ -118,9 +118,9 @@ class BagRecording {
       if (std::string said = rectified_topics(contents_, topics_); !said.empty()) out_.info.warnings.push_back(std::move(said));
     }
     if (const std::string& imu = options_.dataset.kalibr_imu; !imu.empty()) {
-      const Result<ImuNoise> given = load_imu(imu, rig_->imu_noise);
+      const Result<StereoRig> given = with_imu_file(*rig_, imu);
       if (!given) return given.error();
-      rig_->imu_noise = *given;
+      rig_ = *given;
     }
     if (std::cmp_greater(topics_.cameras.size(), rig_->camera_count()))
       return Error{ErrorCode::invalid_argument, fmt::format("images of {} cameras are to be used, and the calibration has {}",

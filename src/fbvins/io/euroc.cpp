@@ -16,6 +16,7 @@
 #include "fbvins/io/euroc_rows.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
@@ -121,11 +122,6 @@ class EurocReader {
       warn(fmt::format("{}: no such file; IMU noise figures are the defaults", named("imu0/sensor.yaml")));
     }
     T_BI_ = imu.T_BS;
-    if (options_.kalibr_camchain.empty() && !options_.kalibr_imu.empty()) {
-      const Result<ImuNoise> given = load_imu(options_.kalibr_imu, imu.noise);
-      if (!given) return given.error();
-      imu.noise = *given;
-    }
     return options_.kalibr_camchain.empty() ? read_own_calibration(imu) : read_kalibr_calibration(imu);
   }
 
@@ -148,6 +144,7 @@ class EurocReader {
       cameras.push_back(*read);
     }
     Result<StereoRig> rig = join_euroc(cameras, imu, named(folders().back() + "sensor.yaml"));
+    if (rig && !options_.kalibr_imu.empty()) rig = with_imu_file(*rig, options_.kalibr_imu);
     if (!rig) return rig.error();
     out_.rig = *rig;
     return {};
