@@ -25,6 +25,7 @@
 #include "fbvins/io/image_check.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
+#include "fbvins/io/side_by_side.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
@@ -93,7 +94,7 @@ class BagRecording {
     const ImageTopic& images = contents_.images.at(topic);
     if (images.rows.empty()) return {};
     const auto first = image_of(bag_->read(place_of(images.rows.front().file)), images.encoding, images.compressed);
-    if (!first || first->width() != 2 * rig_->left.width() || first->height() != rig_->left.height()) return {};
+    if (!first || !is_side_by_side(first->width(), first->height(), *rig_)) return {};
     side_by_side_ = true;
     topics_.cameras.push_back(topic);
     out_.info.warnings.push_back(
