@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +18,7 @@
 #include "apps/terminal.hpp"
 #include "fbvins/bags/bag_survey.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/io/file_source.hpp"
 #include "fbvins/io/known_file.hpp"
 
 namespace fbvins::app {
@@ -27,6 +30,8 @@ constexpr const char* kExamples = R"(examples:
   fbvins info flight.bag                         topics and rates of a bag, also without a calibration
   fbvins info poses.txt                          what a file is that is no recording, and what it is for
 )";
+
+constexpr std::uint64_t kLargestChain_bytes = std::uint64_t{1} << 20u;
 
 struct Arguments {
   RecordingArguments recording;
@@ -87,8 +92,9 @@ void print_imu_calibration(const ImuNoise& imu) {
   };
   const Vec3 &bg = axes.bias.gyro_radps, &ba = axes.bias.accel_mps2;
   fmt::print("{:<14}gyroscope: {}, bias {:.4f} {:.4f} {:.4f} rad/s{}\n", "", off(axes.gyro), bg.x(), bg.y(), bg.z(),
-             axes.gyro_by_force.isZero(0) ? "" : fmt::format(", up to {:.4f} rad/s for each m/s^2",
-                                                             axes.gyro_by_force.cwiseAbs().maxCoeff()));
+             axes.gyro_by_force.isZero(0)
+                 ? ""
+                 : fmt::format(", up to {:.4f} rad/s for each m/s^2", axes.gyro_by_force.cwiseAbs().maxCoeff()));
   fmt::print("{:<14}accelerometer: {}, bias {:.4f} {:.4f} {:.4f} m/s^2\n", "", off(axes.accel), ba.x(), ba.y(), ba.z());
 }
 
@@ -123,28 +129,43 @@ void print_text(const std::string& path, const BagSurvey& bag) {
              bag.depth.empty() ? "" : ", depth images " + bag.depth);
 }
 
+bool calibration_given(const Arguments& arguments) {
+  return !arguments.recording.calibration.empty() || !arguments.recording.imu_calibration.empty();
+}
+
 /// A bag is shown also where it cannot be run before a calibration or its topics are named; that is said, and is no failure here.
 /// Images that nothing can be done with are one.
 int show_bag(const Arguments& arguments, const BagSurvey& bag, const Error& why) {
   for (const std::string& warning : bag.warnings) warn(warning);
   if (arguments.json) fmt::print("{}\n", describe(bag).dump(2));
   else print_text(arguments.recording.path, bag);
-  if (!arguments.recording.topics.empty() && !bag.question.empty()) return fail(why.message);
+  if (calibration_given(arguments) || (!arguments.recording.topics.empty() && !bag.question.empty())) return fail(why.message);
   if (bag.question.empty() && bag.no_calibration.empty()) return fail(why.message);
   if (!bag.unreadable.empty()) return fail(fmt::format("{}: {}", arguments.recording.path, bag.unreadable));
   warn(why.message);
   return kOk;
 }
 
+/// Of a folder that has images and cannot be opened, that is what is to be said.
+bool has_images(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path + "/mav0/cam0/data.csv", ignored) ||
+         std::filesystem::exists(path + "/cam0/data.csv", ignored);
+}
+
 /// What a file is that is no recording.
 std::optional<KnownFile> file_of(const std::string& path) {
-  if (const Result<StereoRig> rig = calibration_in(path)) {
+  const Result<StereoRig> rig = calibration_in(path);
+  if (rig) {
     std::string what = fmt::format("a calibration of {} camera{}", rig->camera_count(), rig->camera_count() == 1 ? "" : "s");
     for (int i = 0; i < rig->camera_count(); ++i) what += fmt::format("; camera {}: {}", i, lens_of(rig->camera(i)));
     if (rig->has_right()) what += fmt::format("; baseline {:.4f} m", rig->T_C1C0().p.norm());
     return KnownFile{what + "; " + times_of(*rig), "give it by --calibration"};
   }
-  return known_file(path);
+  if (auto known = known_file(path)) return known;
+  if (const auto text = read_file(path, kLargestChain_bytes); text && text->find("camera_model") != std::string::npos)
+    return KnownFile{"a calibration in Kalibr's form", "it cannot be used: " + rig.error().message};
+  return std::nullopt;
 }
 
 int show_file(const Arguments& arguments, const KnownFile& file) {
@@ -162,7 +183,8 @@ int show(const Arguments& arguments) {
   if (!data) {
     if (const auto bag = survey_recording(arguments.recording); bag && !bag->topics.empty())
       return show_bag(arguments, *bag, data.error());
-    if (const auto file = file_of(arguments.recording.path)) return show_file(arguments, *file);
+    if (!calibration_given(arguments) && !has_images(arguments.recording.path))
+      if (const auto file = file_of(arguments.recording.path)) return show_file(arguments, *file);
     return fail(data.error().message);
   }
   RecordingWarnings().print((*data)->info());

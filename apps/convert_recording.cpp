@@ -12,6 +12,7 @@
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_recover.hpp"
+#include "fbvins/io/rosbag2_folder.hpp"
 #include "fbvins/io/trajectory.hpp"
 
 namespace fbvins::app {
@@ -83,10 +84,11 @@ class InBetween {
   std::size_t next_ = 0;
 };
 
-Result<Sink> make_sink(const std::string& out, const Dataset& data) {
+Result<Sink> make_sink(const ConvertTarget& target, const Dataset& data) {
+  const std::string& out = target.path;
   if (std::filesystem::exists(out)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", out)};
   if (out.ends_with(".bag")) {
-    auto bag = Ros1BagWriter::create(out, data.rig(), data.frames().front().t);
+    auto bag = Ros1BagWriter::create(out, data.rig(), data.frames().front().t, target.names);
     if (!bag) return bag.error();
     return sink_of(std::make_shared<Ros1BagWriter>(*std::move(bag)));
   }
@@ -100,24 +102,34 @@ Result<Sink> make_sink(const std::string& out, const Dataset& data) {
   return sink_of(std::make_shared<EurocSink>(EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}}));
 }
 
+/// An image's camera_info goes with it, and lies where ROS's programs look for it.
+void add_camera_infos(ConvertTarget& target) {
+  const auto beside = [](const std::string& topic) { return topic.substr(0, topic.rfind('/')) + "/camera_info"; };
+  const std::map<std::string, std::string> given = target.names;
+  for (const auto& [before, after] : given) {
+    const bool of_bag = before.starts_with("/cam") && before.ends_with("/image_raw");
+    const bool of_record = before.starts_with("/camera/") && before != kDepthTopic && before.rfind('/') == 7;
+    if (of_bag || of_record) target.names.try_emplace(of_bag ? beside(before) : before + "/camera_info", beside(after));
+  }
+}
+
 /// All messages of a record, or those of a part of it with the second of readings before.
-Result<int> copy_record(Dataset& data, const ConvertedRecord& record, const std::string& out,
+Result<int> copy_record(Dataset& data, const ConvertedRecord& record, const ConvertTarget& target,
                         const std::function<void(int frames)>& on_frame) {
   constexpr Duration kLeadIn{1'000'000'000}, kBehind{100'000'000};
   const DatasetInfo& info = data.info();
-  const McapPart part = record.whole ? McapPart{} : McapPart{info.first_image - kLeadIn, info.last_image + kBehind};
-  const auto copied = recover_mcap(record.path, out, part);
+  McapPart part = record.whole ? McapPart{} : McapPart{info.first_image - kLeadIn, info.last_image + kBehind};
+  part.names = target.names;
+  const auto copied =
+      target.rosbag2 ? write_rosbag2(record.path, target.path, part) : recover_mcap(record.path, target.path, part);
   if (!copied) return copied.error();
   on_frame(info.frames);
   return info.frames;
 }
 
-}  // namespace
-
-Result<int> convert_recording(Dataset& data, const ConvertedRecord& record, const std::string& out,
-                              const std::function<void(int frames)>& on_frame) {
-  if (!record.path.empty() && out.ends_with(".mcap")) return copy_record(data, record, out, on_frame);
-  Result<Sink> sink = make_sink(out, data);
+Result<int> write_events(Dataset& data, const ConvertedRecord& record, const ConvertTarget& target,
+                         const std::function<void(int frames)>& on_frame) {
+  Result<Sink> sink = make_sink(target, data);
   if (!sink) return sink.error();
   int frames = 0;
   const Trajectory<W> odometry = record.path.empty() ? Trajectory<W>{} : recorded_odometry(record.path);
@@ -137,6 +149,35 @@ Result<int> convert_recording(Dataset& data, const ConvertedRecord& record, cons
   if (Result<void> taken = record.whole ? add_until(kEnd) : truth.add_until(kEnd); !taken) return taken.error();
   if (Result<void> done = sink->finish(); !done) return done.error();
   return frames;
+}
+
+}  // namespace
+
+Result<int> convert_recording(Dataset& data, const ConvertedRecord& record, const ConvertTarget& given,
+                              const std::function<void(int frames)>& on_frame) {
+  ConvertTarget target = given;
+  add_camera_infos(target);
+  const bool mcap = target.path.ends_with(".mcap");
+  if (!target.rosbag2 && !mcap && !target.path.ends_with(".bag") && !target.names.empty())
+    return Error{ErrorCode::invalid_argument, "an EuRoC folder has no topics that could get other names"};
+  if (!record.path.empty() && (mcap || target.rosbag2)) return copy_record(data, record, target, on_frame);
+  if (!target.rosbag2 && (!mcap || target.names.empty())) return write_events(data, record, target, on_frame);
+  // As a record first, which is then written again with other names, or beside its metadata.
+  std::string as_record = target.path;
+  while (as_record.size() > 1 && as_record.ends_with('/')) as_record.pop_back();
+  if (std::filesystem::exists(as_record)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", target.path)};
+  as_record += ".part.mcap";
+  const auto frames = write_events(data, record, {as_record}, on_frame);
+  Result<RecoveredMcap> done = RecoveredMcap{};
+  if (frames) {
+    const McapPart part{.names = target.names};
+    done = target.rosbag2 ? write_rosbag2(as_record, target.path, part) : recover_mcap(as_record, target.path, part);
+  }
+  std::error_code ignored;
+  std::filesystem::remove(as_record, ignored);
+  if (!frames) return frames.error();
+  if (!done) return done.error();
+  return *frames;
 }
 
 }  // namespace fbvins::app

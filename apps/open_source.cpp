@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/open_source.hpp"
 
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/v4l2/v4l2_source.hpp"
 #ifdef FBVINS_WITH_BAGS
@@ -27,8 +32,26 @@ Result<std::unique_ptr<Source>> open_realsense([[maybe_unused]] const std::strin
 #else
   return Error{
       ErrorCode::invalid_argument,
-      "this program was built without librealsense2, which the source d435i needs (docs/d435i.md; examples/d435i_bridge.py needs none)"};
+      "this program was built without librealsense2, which the source d435i needs: `pip install pyrealsense2 numpy`, run "
+      "`python3 examples/d435i_bridge.py /tmp/fbvins.sock`, and give --source socket:/tmp/fbvins.sock (docs/d435i.md)"};
 #endif
+}
+
+/// Devices that a program of their maker's language reads; none where it is another word.
+std::optional<Error> by_a_bridge(const std::string& kind) {
+  struct Bridge {
+    const char *kind, *packages, *script;
+  };
+  constexpr Bridge kBridges[] = {{"oak", "depthai numpy", "oak_bridge.py"},
+                                 {"orbbec", "pyorbbecsdk2 numpy", "orbbec_bridge.py"},
+                                 {"realsense", "pyrealsense2 numpy", "d435i_bridge.py"}};
+  for (const Bridge& bridge : kBridges)
+    if (kind == bridge.kind)
+      return Error{ErrorCode::invalid_argument,
+                   fmt::format("source '{}': its program sends what the device gives: `pip install {}`, run `python3 examples/{} "
+                               "/tmp/fbvins.sock`, and give --source socket:/tmp/fbvins.sock (docs/devices.md)",
+                               kind, bridge.packages, bridge.script)};
+  return std::nullopt;
 }
 
 #ifdef FBVINS_WITH_BAGS
@@ -57,6 +80,7 @@ Result<std::unique_ptr<Source>> open_source(const std::string& name, const Sourc
   const auto colon = name.find(':');
   const std::string kind = name.substr(0, colon), where = colon == std::string::npos ? "" : name.substr(colon + 1);
   if (kind == "d435i") return open_realsense(where, options);
+  if (auto bridge = by_a_bridge(kind)) return *bridge;
   if (kind == "v4l2") return as_source(V4l2Source::open(where, options));
 #ifdef FBVINS_WITH_BAGS
   if (kind == "replay" && !where.empty())

@@ -72,8 +72,15 @@ def hear(connection, free, timeout_s):
 
 
 def main():
+    if len(sys.argv) not in (2, 3) or sys.argv[1].startswith("-"):
+        asked = sys.argv[1:] in (["-h"], ["--help"])
+        print("usage: socket_sender.py PATH [SECONDS]   (fbvins live --source socket:PATH waits there; 30 s)", file=sys.stdout if asked else sys.stderr)
+        sys.exit(0 if asked else 2)
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    connection.connect(sys.argv[1])
+    try:
+        connection.connect(sys.argv[1])
+    except OSError as error:
+        sys.exit(f"{sys.argv[1]}: {error.strerror}; start fbvins live --source socket:{sys.argv[1]} first")
     memory = os.memfd_create("images", os.MFD_ALLOW_SEALING)
     os.ftruncate(memory, SLOTS * SLOT_BYTES)
     fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK)

@@ -4,6 +4,7 @@
 
 usage: bags_by_others.py FBVINS PYTHON      exit 77 (skipped) where PYTHON lacks rosbags or mcap
 """
+import collections
 import json
 import os
 import pathlib
@@ -19,6 +20,7 @@ try:
                              write_ros1, write_ros2, write_split)
     from mcap.writer import CompressionType
     from rosbags import rosbag1, rosbag2
+    from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 except ImportError as lack:
     if len(sys.argv) > 2 and os.path.exists(sys.argv[2]) and not os.environ.get("FBVINS_TRIED"):
@@ -105,6 +107,16 @@ def check_converted(program, folder, root, expected):
             assert connection.msgtype != "sensor_msgs/msg/Image" or len(message.data) == message.height * message.step
             assert store.generate_msgdef(connection.msgtype, ros_version=1)[1] == connection.digest, connection.msgtype
     print("converted from bag to MCAP to bag to folder: the same bytes, and rosbags reads the bag")
+
+    bag2, names = root / "bag2", {"/camera/left": "/cam0/image_raw", "/camera/right": "/cam1/image_raw", "/imu": "/imu0"}
+    renamed = ",".join(f"{before}={after}" for before, after in names.items())
+    subprocess.run([program, "convert", root / "lz4.bag", bag2, "--quiet", "--rosbag2", "--rename", renamed, "--calibration", folder], check=True)
+    with AnyReader([bag2]) as bag:
+        read = collections.Counter(connection.topic for connection, _, _ in bag.messages())
+        assert read == {c.topic: c.msgcount for c in bag.connections if c.msgcount}, read
+        assert read["/cam0/image_raw"] == read["/cam1/image_raw"] == read["/cam0/camera_info"] == IMAGES and read["/imu0"] > IMAGES, read
+    assert trajectory(program, bag2, root / "out", "--calibration", folder) == expected, "a folder of rosbag2: another trajectory"
+    print("converted to a folder of rosbag2 with other names: rosbags reads all of it, and the trajectory is the same")
 
     def kept(recording):
         about = json.loads(subprocess.run([program, "info", recording, "--json"], check=True, capture_output=True, text=True).stdout)

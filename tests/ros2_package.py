@@ -101,8 +101,8 @@ def check_launch_files(root, program):
     full = {"config": "a.yaml", "calibration": "chain.yaml", "imu_calibration": "imu.yaml", "interface": "eth0", "arguments": "--map 'flat one.fbm' --quiet"}
     expected = {("live.launch.py", ""): ["socket:/run/fbvins.sock"], ("d435i.launch.py", ""): ["d435i"], ("d435i.launch.py", "bridge"): ["socket:/tmp/fbvins.sock"],
                 ("oak.launch.py", "bridge"): ["socket:/tmp/fbvins.sock"],
-                ("topics.launch.py", ""): ["ros2:/camera/infra1/image_rect_raw,/camera/infra2/image_rect_raw,/camera/imu"],
-                ("topics.launch.py", "bag"): ["ros2:/camera/infra1/image_rect_raw,/camera/infra2/image_rect_raw,/camera/imu"]}
+                ("topics.launch.py", ""): ["ros2:/camera/camera/infra1/image_rect_raw,/camera/camera/infra2/image_rect_raw,/camera/camera/imu"],
+                ("topics.launch.py", "bag"): ["ros2:/camera/camera/infra1/image_rect_raw,/camera/camera/infra2/image_rect_raw,/camera/camera/imu"]}
     require({name for name, _ in expected} | {"component.launch.py"} == {f.name for f in folder.glob("*")}, "a launch file that this test does not know")
     for (name, more), sources in expected.items():
         for given in ({}, full):

@@ -84,7 +84,7 @@ int convert(Dataset& data, const std::string& record, const std::string& out) {
   const bool is_record = data.info().format == "MCAP flight record";
   return value_or_raise([&] {
     nb::gil_scoped_release released;
-    return app::convert_recording(data, {is_record ? record : std::string()}, out, check_signals);
+    return app::convert_recording(data, {is_record ? record : std::string()}, {out}, check_signals);
   }());
 }
 

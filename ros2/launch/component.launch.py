@@ -17,13 +17,13 @@ from launch_ros.actions import ComposableNodeContainer, LoadComposableNodes
 from launch_ros.descriptions import ComposableNode
 
 ARGUMENTS = (
-    ("left", "/camera/infra1/image_rect_raw", "sensor_msgs/Image of the left camera"),
+    ("left", "/camera/camera/infra1/image_rect_raw", "sensor_msgs/Image of the left camera"),
     (
         "right",
-        "/camera/infra2/image_rect_raw",
+        "/camera/camera/infra2/image_rect_raw",
         "sensor_msgs/Image of the right camera; empty: there is one camera",
     ),
-    ("imu", "/camera/imu", "sensor_msgs/Imu"),
+    ("imu", "/camera/camera/imu", "sensor_msgs/Imu"),
     ("calibration", "", "Kalibr's camchain-imucam.yaml"),
     ("imu_calibration", "", "Kalibr's imu.yaml"),
     ("config", "", "configuration (YAML)"),

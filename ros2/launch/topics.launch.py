@@ -22,9 +22,9 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 
 ARGUMENTS = (
-    ("left", "/camera/infra1/image_rect_raw", "sensor_msgs/Image of the left camera"),
-    ("right", "/camera/infra2/image_rect_raw", "sensor_msgs/Image of the right camera"),
-    ("imu", "/camera/imu", "sensor_msgs/Imu"),
+    ("left", "/camera/camera/infra1/image_rect_raw", "sensor_msgs/Image of the left camera"),
+    ("right", "/camera/camera/infra2/image_rect_raw", "sensor_msgs/Image of the right camera"),
+    ("imu", "/camera/camera/imu", "sensor_msgs/Imu"),
     ("bag", "", "a bag to play; its topics are those above"),
 )
 FIND_EACH_OTHER_S = 3.0  # before the bag plays

@@ -213,8 +213,8 @@ class FbvinsComponent final : public rclcpp::Node {
  public:
   explicit FbvinsComponent(const rclcpp::NodeOptions& options) : Node("fbvins", options) {
     const auto images = declare_parameter<std::vector<std::string>>(
-        "images", std::vector<std::string>{"/camera/infra1/image_rect_raw", "/camera/infra2/image_rect_raw"});
-    const auto imu = declare_parameter<std::string>("imu", "/camera/imu");
+        "images", std::vector<std::string>{"/camera/camera/infra1/image_rect_raw", "/camera/camera/infra2/image_rect_raw"});
+    const auto imu = declare_parameter<std::string>("imu", "/camera/camera/imu");
     const auto chain = declare_parameter<std::string>("calibration", "");
     const auto imu_noise = declare_parameter<std::string>("imu_calibration", "");
     const auto file = declare_parameter<std::string>("config", "");

@@ -11,19 +11,13 @@
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/io/image_check.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
 namespace {
 
 std::pair<int, int> size_of(const Image& image) { return {image.width(), image.height()}; }
 std::pair<int, int> size_of(const DepthImage& image) { return {image.width, image.height}; }
-
-Image part_of(const Image& both, BagLoader::Sensor::Part part) {
-  Image out(both.width() / 2, both.height());
-  const int from = part == BagLoader::Sensor::right_half ? out.width() : 0;
-  for (int y = 0; y < out.height(); ++y) std::copy_n(std::as_const(both).row(y) + from, out.width(), out.row(y));
-  return out;
-}
 
 }  // namespace
 
@@ -65,7 +59,7 @@ LoadedFrame BagLoader::load(const FrameEntry& entry) {
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const auto read = [&](const Sensor& s, std::string_view bytes) {
       Result<Image> image = image_of(bytes, s.encoding, s.compressed, used_bits_);
-      return image && s.part != Sensor::whole ? Result<Image>(part_of(*image, s.part)) : image;
+      return image && s.part != Sensor::whole ? Result<Image>(half_of(*image, s.part == Sensor::right_half ? 1 : 0)) : image;
     };
     ImageCounts& counts = i == 0 ? out.left : i == 1 ? out.right : out.more;
     if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, counts, out))

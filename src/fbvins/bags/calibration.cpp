@@ -125,13 +125,13 @@ Result<StereoRig> load_euroc(const std::string& folder) {
 
 std::string calibration_format(const std::string& text) {
   if (holds(text, "body_T_cam0")) return "VINS-Fusion";
-  if (holds(text, "\"value0\"")) return "Basalt";
+  if (holds(text, "\"value0\"") && !holds(text, "config.")) return "Basalt";
   if (holds(text, "T_cam_imu")) return "Kalibr";
   if (holds(text, "projection_parameters") && (holds(text, "extrinsicRotation") || holds(text, "imu_topic"))) return "VINS-Mono";
   if (holds(text, "Camera.type") || holds(text, "Camera.fx") || holds(text, "Camera1.fx")) return "ORB-SLAM3";
   if (holds(text, "\"cameraData\"")) return "OAK";
   if (holds(text, "camera_id") && holds(text, "T_BS")) return "Kimera";
-  if (holds(text, "camera_matrix") && holds(text, "distortion_coefficients")) return "camera_info";
+  if (holds(text, "camera_matrix") && holds(text, "distortion_coefficients") && !holds(text, "opencv")) return "camera_info";
   if (holds(text, "relative_config_imucam") || holds(text, "T_imu_cam")) return "OpenVINS";
   return "";
 }

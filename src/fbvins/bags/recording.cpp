@@ -25,6 +25,7 @@
 #include "fbvins/io/image_check.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
+#include "fbvins/io/side_by_side.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
@@ -93,7 +94,7 @@ class BagRecording {
     const ImageTopic& images = contents_.images.at(topic);
     if (images.rows.empty()) return {};
     const auto first = image_of(bag_->read(place_of(images.rows.front().file)), images.encoding, images.compressed);
-    if (!first || first->width() != 2 * rig_->left.width() || first->height() != rig_->left.height()) return {};
+    if (!first || !is_side_by_side(first->width(), first->height(), *rig_)) return {};
     side_by_side_ = true;
     topics_.cameras.push_back(topic);
     out_.info.warnings.push_back(
@@ -118,9 +119,9 @@ class BagRecording {
       if (std::string said = rectified_topics(contents_, topics_); !said.empty()) out_.info.warnings.push_back(std::move(said));
     }
     if (const std::string& imu = options_.dataset.kalibr_imu; !imu.empty()) {
-      const Result<ImuNoise> given = load_imu(imu, rig_->imu_noise);
+      const Result<StereoRig> given = with_imu_file(*rig_, imu);
       if (!given) return given.error();
-      rig_->imu_noise = *given;
+      rig_ = *given;
     }
     if (std::cmp_greater(topics_.cameras.size(), rig_->camera_count()))
       return Error{ErrorCode::invalid_argument, fmt::format("images of {} cameras are to be used, and the calibration has {}",

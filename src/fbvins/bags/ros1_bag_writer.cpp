@@ -57,6 +57,18 @@ struct Ros1BagWriter::State {
   std::vector<ChunkInfo> chunks;
   std::vector<ros1::Topic> all;
 
+  Result<void> rename(const std::map<std::string, std::string>& names) {
+    for (const auto& [before, after] : names) {
+      const auto topic = std::ranges::find(all, before, &ros1::Topic::name);
+      if (topic == all.end())
+        return Error{ErrorCode::invalid_argument, fmt::format("a bag of this recording has no topic '{}'", before)};
+      if (std::ranges::find(all, after, &ros1::Topic::name) != all.end())
+        return Error{ErrorCode::invalid_argument, fmt::format("two topics would be '{}'", after)};
+      topic->name = after;
+    }
+    return {};
+  }
+
   void write(std::string_view bytes) { file.write(bytes); }
   Result<void> good() const { return file.status(); }
 
@@ -147,10 +159,12 @@ struct Ros1BagWriter::State {
 
 std::string bag_camera_topic(int camera) { return fmt::format("/cam{}/image_raw", camera); }
 
-Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const StereoRig& rig, Time start) {
+Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const StereoRig& rig, Time start,
+                                            const std::map<std::string, std::string>& names) {
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();
   auto state = std::make_unique<State>(*std::move(file), rig);
+  if (Result<void> done = state->rename(names); !done) return done.error();
   state->write(kBagBegins);
   state->write(state->bag_header(0));
   if (Result<void> done = state->good(); !done) return done.error();

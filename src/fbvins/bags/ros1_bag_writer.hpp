@@ -6,6 +6,7 @@
 //   Result<void> done = bag->finish();          // the file appears here
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 
@@ -24,8 +25,10 @@ inline constexpr std::string_view kBagDepthTopic = "/depth0/image_raw";
 
 class Ros1BagWriter {
  public:
-  /// With camera_info and /tf_static of the rig at `start`, and all of it as text (rig_text.hpp) on kRigTopic.
-  static Result<Ros1BagWriter> create(const std::string& path, const StereoRig& rig, Time start);
+  /// With camera_info and /tf_static of the rig at `start`, and all of it as text (rig_text.hpp) on kRigTopic. `names`: topics
+  /// that get another name.
+  static Result<Ros1BagWriter> create(const std::string& path, const StereoRig& rig, Time start,
+                                      const std::map<std::string, std::string>& names = {});
   ~Ros1BagWriter();
   Ros1BagWriter(Ros1BagWriter&&) noexcept;
   Ros1BagWriter& operator=(Ros1BagWriter&&) noexcept;

@@ -10,7 +10,7 @@ namespace fbvins {
 namespace {
 
 constexpr int kTile_px = 4;           ///< black and white are looked for in tiles
-constexpr int kLeastDifference = 20;  ///< grey values between black and white of a place
+constexpr int kLeastDifference = 12;  ///< grey values between black and white of a place
 /// Where the corners of two squares meet it is half as bright as black and white together, whatever the blur: below half they
 /// come apart there.
 constexpr double kDark = 0.4;

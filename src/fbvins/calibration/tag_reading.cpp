@@ -9,7 +9,7 @@ namespace fbvins {
 namespace {
 
 constexpr int kTags = 587;             ///< of the family
-constexpr int kLeastTagContrast = 20;  ///< grey values between the border and the gap
+constexpr int kLeastTagContrast = 12;  ///< grey values between the border and the gap
 constexpr int kMostWrongRead = 2;      ///< cells of a tag that nobody expects there
 constexpr double kSharpening = 0.25;   ///< a cell of two pixels is as bright as its neighbours in part
 constexpr double kAside = 0.2;         ///< of a cell: it is looked at in four places about its middle

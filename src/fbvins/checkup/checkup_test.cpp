@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "fbvins/checkup/first_seconds.hpp"
 #include "fbvins/checkup/reading_noise_seen.hpp"
@@ -209,7 +213,8 @@ std::vector<Time> stamps_in_turns(const std::vector<double>& intervals_ms, int r
   std::vector<Time> images{Time{1'100'000'000}};
   for (std::size_t i = 0; images.back().seconds() < 6.9; ++i) {
     const double ms = intervals_ms[i / static_cast<std::size_t>(run) % intervals_ms.size()];
-    const std::int64_t off = off_ns == 0 ? 0 : static_cast<std::int64_t>(i * 2654435761U % static_cast<std::size_t>(2 * off_ns)) - off_ns;
+    const std::int64_t off =
+        off_ns == 0 ? 0 : static_cast<std::int64_t>(i * 2654435761U % static_cast<std::size_t>(2 * off_ns)) - off_ns;
     images.push_back(images.back() + Duration{static_cast<std::int64_t>(1e6 * ms) + off});
   }
   return images;
@@ -277,6 +282,32 @@ TEST(Checkup, SeesLeftAndRightExchanged) {
   const StereoOrder order = stereo_order(rig(), std::span(&frame, 1));
   EXPECT_TRUE(order.swapped()) << order.as_named << " " << order.as_swapped << " of " << order.features;
   EXPECT_TRUE(check_stereo_order(order));
+}
+
+/// Spots of an infrared projector, which move with the camera.
+TEST(Checkup, SeesAProjectorThatIsOn) {
+  FirstSeconds plain(rig()), lit(rig());
+  Rng rng(3);
+  std::vector<Vec2> spots;
+  for (int y = 10; y < 310; y += 20)
+    for (int x = 10; x < 470; x += 20) {
+      const double dx = rng.uniform(0, 8), dy = rng.uniform(0, 8);
+      spots.emplace_back(x + dx, y + dy);
+    }
+  for (const Time t : {Time{1'000'000'000}, Time{3'000'000'000}, Time{5'000'000'000}}) {
+    StereoFrame frame = wall(t);
+    plain.push(frame);
+    auto left = std::make_shared<Image>(*frame.left);
+    for (const Vec2& spot : spots)
+      for (int y = 0; y < left->height(); ++y)
+        for (int x = 0; x < left->width(); ++x)
+          if (const double far = (Vec2(x, y) - spot).squaredNorm(); far < 16)
+            left->at(x, y) = static_cast<std::uint8_t>(std::min(255.0, left->at(x, y) + 110 * std::exp(-0.5 * far)));
+    frame.left = left;
+    lit.push(frame);
+  }
+  EXPECT_FALSE(says(plain.findings(), FindingKind::projector_dots));
+  EXPECT_TRUE(says(lit.findings(), FindingKind::projector_dots));
 }
 
 TEST(Checkup, AFindingIsOneLineAndItsCorrections) {

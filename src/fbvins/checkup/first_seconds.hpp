@@ -21,7 +21,7 @@ class FirstSeconds {
   void push(const SensorEvent& event);
   /// Enough has been seen; what comes later is ignored.
   bool is_over() const;
-  /// Units, stamps, noise figures, left and right exchanged. Also after a recording shorter than that.
+  /// Units, stamps, noise figures, a projector's dots, left and right exchanged. Also after a recording shorter than that.
   std::vector<Finding> findings() const;
 
  private:

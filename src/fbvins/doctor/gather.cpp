@@ -6,6 +6,7 @@
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/depth_reader.hpp"
+#include "fbvins/checkup/projector_dots.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/fixed_view.hpp"
@@ -40,22 +41,6 @@ bool same(const std::shared_ptr<const Image>& a, const std::shared_ptr<const Ima
   for (int y = 0; y < a->height(); ++y)
     if (!std::equal(a->row(y), a->row(y) + a->width(), b->row(y))) return false;
   return true;
-}
-
-/// A spot of light: much brighter than all pixels four away from it, which are alike.
-bool is_bright_dot(const PyramidLevel& image, const Vec2& px) {
-  const int x = static_cast<int>(std::lround(px.x())), y = static_cast<int>(std::lround(px.y()));
-  constexpr int kRing = 4;
-  if (x < kRing + 1 || y < kRing + 1 || x >= image.width - kRing - 1 || y >= image.height - kRing - 1) return false;
-  int peak = 0;
-  for (int dy = -1; dy <= 1; ++dy)
-    for (int dx = -1; dx <= 1; ++dx) peak = std::max<int>(peak, image.row(y + dy)[x + dx]);
-  int brightest = 0, darkest = 255;
-  for (int i = -kRing; i <= kRing; ++i)
-    for (const int value :
-         {image.row(y - kRing)[x + i], image.row(y + kRing)[x + i], image.row(y + i)[x - kRing], image.row(y + i)[x + kRing]})
-      brightest = std::max<int>(brightest, value), darkest = std::min<int>(darkest, value);
-  return peak - brightest > 12 && peak - brightest > 0.4 * (brightest - darkest);
 }
 
 }  // namespace

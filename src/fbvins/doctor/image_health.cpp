@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 
+#include "fbvins/checkup/projector_dots.hpp"
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -57,7 +58,7 @@ constexpr double kApart_s = 0.5, kOthersMove_px = 5, kOthersMoveALot_px = 10, kS
 /// enough: then the whole scene moves in the image, and not only things that move in the scene.
 constexpr double kLeastMoving = 0.25, kTurned_px = 20;
 constexpr std::size_t kFewestMoving = 8, kFewestFeatures = 20;
-constexpr double kMostFixed = 0.15, kMostDots = 0.2;
+constexpr double kMostFixed = 0.15;
 constexpr int kFewestPairs = 8;
 
 struct Moved {
@@ -140,16 +141,9 @@ FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu) {
 }
 
 std::optional<Finding> check_fixed(const FixedFeatures& fixed) {
-  Finding finding;
-  if (fixed.dots > kMostDots) {
-    finding.kind = FindingKind::projector_dots;
-    finding.size = fixed.dots, finding.unit = "of the features";
-    finding.measured = fmt::format("{:.0f} % of the features are small bright spots", 100 * fixed.dots);
-    finding.expected = "few: a pattern of spots moves with the camera and hides the scene";
-    finding.advice = "switch the camera's infrared projector off (emitter_enabled: 0)";
-    return finding;
-  }
+  if (auto dots = check_dots(fixed.dots)) return dots;
   if (fixed.pairs < kFewestPairs || fixed.share < kMostFixed) return std::nullopt;
+  Finding finding;
   finding.kind = FindingKind::fixed_in_view;
   finding.size = fixed.share, finding.unit = "of the features";
   finding.measured =

@@ -8,13 +8,14 @@ namespace fbvins {
 namespace {
 
 constexpr double kMeasured_s = 0.25;
-/// What vibration counts as, of white noise of its size: it swings back and forth, a turn much more than a shift. Of six flights of a
-/// hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md) and whose
-/// readings have 2.7e-3 and 0.07.
+/// What vibration counts as, of white noise of its size: it swings back and forth, a turn much more than a shift. Of six flights
+/// of a hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md)
+/// and whose readings have 2.7e-3 and 0.07.
 constexpr double kGyroShare = 0.25, kAccelShare = 1;
 /// Axes and scale that are off make an error of a specific force that changes, for as long as a motion lasts.
 constexpr double kMotion_s = 0.3, kMean_s = 1;
-/// Readings that differ much less from one another than the calibrated noise says have less; filters in the sensor hide this part.
+/// Readings that differ much less from one another than the calibrated noise says have less; filters in the sensor hide this
+/// part.
 constexpr double kHidden = 3;
 /// For single readings: the highest vibration of these flights, about the median of other vehicles, and of noisy sensors so many
 /// standard deviations.
@@ -22,21 +23,29 @@ constexpr double kUsualGyro_radps = 0.07, kUsualAccel_mps2 = 3.0;
 constexpr double kUsualNoise = 3;
 /// A single reading that is off by so many times the usual vibration is wrong, or a blow.
 constexpr double kOutlier = 6;
-/// An axis that gives the same number so often, at a number this large and the largest so far, while the others change, is at the end of
-/// its range; it may be wrong by as much again. Readings of which nothing changes are repeated ones.
+/// An axis that gives the same number so often, at a number this large and the largest so far, while the others change, is at the
+/// end of its range; it may be wrong by as much again. Readings of which nothing changes are repeated ones.
 constexpr int kSameUntilClipped = 4;
 constexpr double kOfLargest = 0.9;
 constexpr double kClippedGyro_radps = 0.05, kClippedAccel_mps2 = 15;
 constexpr double kLeastGyroError_radps = 0.5;
+constexpr double kRounding = 1e-9;  ///< of readings whose correction is undone
 
 /// Factor on the noise of readings that differ from one another by `measured` times that noise.
 double with_vibration(double measured, double share) {
   return std::hypot(std::min(1.0, kHidden * measured), share * std::sqrt(std::max(0.0, measured * measured - 1)));
 }
 
+/// What the sensor gave before its axes were corrected: an axis at the end of its range is one of the sensor's.
+ImuSample as_read(const ImuSample& reading, const ImuIntrinsics& axes) {
+  if (axes == ImuIntrinsics{}) return reading;
+  return {reading.t, axes.gyro * reading.gyro_radps + axes.gyro_by_force * reading.accel_mps2 + axes.bias.gyro_radps,
+          axes.accel * reading.accel_mps2 + axes.bias.accel_mps2};
+}
+
 /// Readings in a row with the same large number, 0 before the axis has changed for the first time.
-int count_same(int before, double previous, double now, double least) {
-  if (now != previous) return 1;
+int count_same(int before, double previous, double now, double least, double rounding) {
+  if (!(std::abs(now - previous) <= rounding)) return 1;
   return before == 0 || std::abs(now) < least ? std::min(before, 1) : before + 1;
 }
 
@@ -60,12 +69,14 @@ void ReadingNoise::add(const ImuSample& reading) {
     differences_.push_back({reading.t, gyro.squaredNorm() / 18, accel.squaredNorm() / 18});  // 3 axes, 1 + 4 + 1
     worst_gyro_radps_ = std::max(worst_gyro_radps_, gyro.norm() / 2);
     worst_accel_mps2_ = std::max(worst_accel_mps2_, accel.norm() / 2);
-    largest_gyro_radps_ = std::max(largest_gyro_radps_, reading.gyro_radps.cwiseAbs().maxCoeff());
+    const ImuSample now = as_read(reading, assumed_.axes), before = as_read(b, assumed_.axes);
+    const double rounding = assumed_.axes == ImuIntrinsics{} ? 0 : kRounding;
+    largest_gyro_radps_ = std::max(largest_gyro_radps_, now.gyro_radps.cwiseAbs().maxCoeff());
     const bool repeated = reading.gyro_radps == b.gyro_radps;
     for (int k = 0; k < 3 && !repeated; ++k) {
-      gyro_same_[k] = count_same(gyro_same_[k], b.gyro_radps(k), reading.gyro_radps(k),
-                                 std::max(kClippedGyro_radps, kOfLargest * largest_gyro_radps_));
-      accel_same_[k] = count_same(accel_same_[k], b.accel_mps2(k), reading.accel_mps2(k), kClippedAccel_mps2);
+      gyro_same_[k] = count_same(gyro_same_[k], before.gyro_radps(k), now.gyro_radps(k),
+                                 std::max(kClippedGyro_radps, kOfLargest * largest_gyro_radps_), rounding);
+      accel_same_[k] = count_same(accel_same_[k], before.accel_mps2(k), now.accel_mps2(k), kClippedAccel_mps2, rounding);
       gyro_clipped_ = gyro_clipped_ || gyro_same_[k] >= kSameUntilClipped;
       accel_clipped_ = accel_clipped_ || accel_same_[k] >= kSameUntilClipped;
     }

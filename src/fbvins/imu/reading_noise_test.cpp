@@ -21,15 +21,16 @@ ImuNoise assumed() {
 
 /// The scale after a second at 200 Hz, in segments of ten readings with interpolated ends; `alter` changes reading k.
 struct Flown {
-  ReadingNoise noise{assumed()};
+  ReadingNoise noise;
   ImuNoiseScale newest;
   double largest_gyro = 1;
   int clipped = 0;
 
-  explicit Flown(const std::function<void(int, ImuSample&)>& alter) {
+  explicit Flown(const std::function<void(int, ImuSample&)>& alter, const ImuNoise& imu = assumed()) : noise(imu) {
     const auto reading = [&](int k) {
       const double t = k * 0.005;
-      ImuSample s{Time{} + Duration::from_seconds(t), Vec3(1.5 * std::sin(6 * t), 0.3 + 0.01 * std::sin(20 * t), -2 * std::cos(4 * t)),
+      ImuSample s{Time{} + Duration::from_seconds(t),
+                  Vec3(1.5 * std::sin(6 * t), 0.3 + 0.01 * std::sin(20 * t), -2 * std::cos(4 * t)),
                   Vec3(3 * std::sin(5 * t), 1, 9.81 + 4 * std::cos(7 * t))};
       alter(k, s);
       return s;
@@ -52,7 +53,8 @@ ImuNoiseScale at_rest_with(double gyro_radps, double accel_mps2) {
   for (int first = 0; first < 400; first += 10) {
     ImuSegment segment;
     for (int k = first; k <= first + 10; ++k)
-      segment.samples.push_back({Time{} + Duration::from_seconds(0.005 * k), gyro_radps * Vec3(rng.normal(), rng.normal(), rng.normal()),
+      segment.samples.push_back({Time{} + Duration::from_seconds(0.005 * k),
+                                 gyro_radps * Vec3(rng.normal(), rng.normal(), rng.normal()),
                                  Vec3(0, 0, 9.81) + accel_mps2 * Vec3(rng.normal(), rng.normal(), rng.normal())});
     out = noise.of(segment);
   }
@@ -113,6 +115,22 @@ TEST(ReadingNoise, AnAxisAtTheEndOfItsRangeMayBeWrongByAsMuchAgain) {
   const Flown flown([](int, ImuSample& s) { s.gyro_radps = s.gyro_radps.cwiseMax(-0.8).cwiseMin(0.8); });
   EXPECT_GT(flown.clipped, 5);
   EXPECT_GT(flown.largest_gyro * assumed().gyro_noise_density_radps_rthz * std::sqrt(0.05), 0.8 * 0.05 * 0.9);
+}
+
+/// Corrected by cross axes, what the sensor gave at the end of its range changes with its other axes.
+TEST(ReadingNoise, TheEndOfARangeIsThatOfTheSensorsOwnAxes) {
+  ImuNoise imu = assumed();
+  imu.axes.gyro << 1.02, 0.03, -0.02, 0.01, 0.97, 0.04, 0.02, -0.03, 1.01;
+  imu.axes.gyro_by_force = 1e-3 * Mat3::Ones();
+  imu.axes.bias.gyro_radps = Vec3(0.01, -0.02, 0.005);
+  const auto at_end = [&](int, ImuSample& s) {
+    ImuSample read = s;
+    read.gyro_radps = (imu.axes.gyro * s.gyro_radps).cwiseMax(-0.8).cwiseMin(0.8);
+    s = corrected(read, imu.axes);
+  };
+  EXPECT_GT(Flown(at_end, imu).clipped, 5);
+  EXPECT_EQ(Flown([](int, ImuSample&) {}, imu).clipped, 0);
+  EXPECT_EQ(Flown(at_end).clipped, 0) << "without the axes it cannot be seen";
 }
 
 TEST(ReadingNoise, EqualNumbersAtRestAreNotTheEndOfARange) {

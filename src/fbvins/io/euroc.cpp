@@ -15,13 +15,16 @@
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/euroc_rows.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/numbers.hpp"
+#include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargestTruth_bytes = std::uint64_t{1} << 30u;
+constexpr std::uint64_t kLargestTruth_bytes = std::uint64_t{1} << 30u, kLargestBeside_bytes = std::uint64_t{1} << 28u;
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
 
@@ -121,11 +124,6 @@ class EurocReader {
       warn(fmt::format("{}: no such file; IMU noise figures are the defaults", named("imu0/sensor.yaml")));
     }
     T_BI_ = imu.T_BS;
-    if (options_.kalibr_camchain.empty() && !options_.kalibr_imu.empty()) {
-      const Result<ImuNoise> given = load_imu(options_.kalibr_imu, imu.noise);
-      if (!given) return given.error();
-      imu.noise = *given;
-    }
     return options_.kalibr_camchain.empty() ? read_own_calibration(imu) : read_kalibr_calibration(imu);
   }
 
@@ -148,9 +146,26 @@ class EurocReader {
       cameras.push_back(*read);
     }
     Result<StereoRig> rig = join_euroc(cameras, imu, named(folders().back() + "sensor.yaml"));
+    if (rig && !options_.kalibr_imu.empty()) rig = with_imu_file(*rig, options_.kalibr_imu);
     if (!rig) return rig.error();
     out_.rig = *rig;
+    if (cameras_.size() == 2 && !exists(folder_of(cameras_[1]) + "data.csv")) split_images(*rig);
     return {};
+  }
+
+  /// The only camera's images may be those of both cameras of the calibration, side by side.
+  bool split_images(const StereoRig& rig) {
+    const std::string folder = folder_of(cameras_.front());
+    const Result<std::string> csv = text(folder + "data.csv", kLargestBeside_bytes);
+    if (rig.camera_count() != 2 || !csv) return false;
+    const auto images = read_image_rows(*csv, named(folder + "data.csv"));
+    if (!images || images->rows.empty()) return false;
+    const Result<std::string> bytes = text(folder + "data/" + images->rows.front().file, kLargestBeside_bytes);
+    const Result<Image> first = bytes ? decode_image(*bytes) : Result<Image>(bytes.error());
+    if (!first || !is_side_by_side(first->width(), first->height(), rig)) return false;
+    cameras_ = {cameras_.front(), cameras_.front()};
+    warn(fmt::format("the images of {} are two side by side: the left half is camera 0, the right one camera 1", named(folder)));
+    return true;
   }
 
   Result<void> read_kalibr_calibration(const ImuSensor& imu) {
@@ -182,6 +197,10 @@ class EurocReader {
   /// A calibration from outside, whose cameras have the numbers of the folders; one of a single camera is that of the first
   /// folder. Cameras that were not recorded, and folders without a calibration, are left out.
   void take(const StereoRig& rig) {
+    if (cameras_.size() == 1 && split_images(rig)) {
+      out_.rig = rig;
+      return;
+    }
     if (rig.camera_count() == 1) cameras_.resize(1);
     else std::erase_if(cameras_, [&](int camera) { return camera >= rig.camera_count(); });
     std::vector<MountedCamera> mounted;

@@ -9,6 +9,7 @@
 #include "fbvins/core/median.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/numbers.hpp"
+#include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
 namespace {
@@ -29,6 +30,12 @@ RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
   }
   problem = fmt::format("'{}' is not a stamp in nanoseconds", field.substr(0, 40));
   return RowVerdict::malformed;
+}
+
+template <int kCamera>
+Result<Image> decode_half(std::string_view bytes) {
+  Result<Image> both = decode_image(bytes);
+  return both ? Result<Image>(half_of(*both, kCamera)) : both;
 }
 
 int width_of(const Image& image) { return image.width(); }
@@ -56,7 +63,9 @@ class EurocLoader : public FrameLoader {
  private:
   std::shared_ptr<const Image> load_image(const std::string& file, int camera, ImageCounts& counts, LoadedFrame& out) const {
     if (file.empty()) return nullptr;
-    return load<Image>(file, folders_[static_cast<std::size_t>(camera)], decode_image, rig_.camera(camera), counts, out);
+    const bool side_by_side = folders_.size() == 2 && folders_[0] == folders_[1];
+    const auto decode = !side_by_side ? decode_image : camera == 0 ? decode_half<0> : decode_half<1>;
+    return load<Image>(file, folders_[static_cast<std::size_t>(camera)], decode, rig_.camera(camera), counts, out);
   }
 
   template <class T>

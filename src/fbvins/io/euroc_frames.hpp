@@ -65,7 +65,8 @@ Intervals measure_intervals(const std::vector<Time>& increasing);
 /// Where depth images are, with a slash at the end.
 inline constexpr std::string_view kDepthFolder = "depth0/";
 
-/// `folders`: of the rig's cameras, in their order, with a slash at the end.
+/// `folders`: of the rig's cameras, in their order, with a slash at the end; twice the same where its images have both side by
+/// side.
 std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
                                                std::vector<std::string> folders, const StereoRig& rig);
 

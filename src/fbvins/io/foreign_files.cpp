@@ -10,8 +10,12 @@
 namespace fbvins {
 namespace {
 
-constexpr const char *kAsKalibr = "write its cameras as Kalibr's chain (docs/calibration.md, What is read)",
-                     *kCalibrate = "calibrate with `fbvins calibrate`", *kOffline = "`fbvins run` and `fbvins info` read it";
+constexpr const char
+    *kAsKalibr = "write its cameras as Kalibr's chain (docs/calibration.md, What is read)",
+    *kCalibrate = "calibrate with `fbvins calibrate`", *kOffline = "`fbvins run` and `fbvins info` read it",
+    *kOfDevice =
+        "`--source d435i` reads the device's own calibration, and a bag of its driver has it with /tf_static; else "
+        "calibrate with `fbvins calibrate`";
 
 /// All of the words are in a file of that kind, and seldom in another.
 struct Kind {
@@ -50,6 +54,8 @@ const std::vector<Kind>& kinds() {
       {{"T_B_C", "cameras:"}, "a rig of cameras of maplab or SVO", "write its cameras as Kalibr's chain: T_B_C as T_imu_cam"},
       {{"CalibrationFile", "Camera0"}, "a configuration of ROVIO", kAsKalibr},
       {{"qCM_", "MrMC_"}, "a configuration of ROVIO", kAsKalibr},
+      {{"opencv_storage"}, "a calibration by OpenCV, without the camera's place on the IMU", kCalibrate},
+      {{"opencv-matrix", "camera_matrix"}, "a calibration by OpenCV, without the camera's place on the IMU", kCalibrate},
       {{"camera_matrix", "distortion_coefficients"},
        "a camera_info file of ROS, without the camera's place on the IMU",
        "write it as Kalibr's chain, with T_cam_imu"},
@@ -71,6 +77,12 @@ const std::vector<Kind>& kinds() {
        "a RealSense's settings (a preset), no calibration",
        "the recording or the device has the calibration, else "
        "calibrate with `fbvins calibrate`"},
+      {{"Intrinsic of", "PPX"},
+       "a RealSense's lenses as rs-enumerate-devices prints them, without their place on the IMU",
+       kOfDevice},
+      {{"\"ppx\"", "\"coeffs\""}, "a RealSense's lens as its library has it, without the camera's place on the IMU", kOfDevice},
+      {{"\"intrinsic_matrix\"", "\"width\""}, "a camera's lens in Open3D's form, without its place on the IMU", kCalibrate},
+      {{"\"fl_x\"", "\"fl_y\""}, "a camera's lens in Nerfstudio's form, without its place on the IMU", kCalibrate},
       {{"imuToCamera"}, "a calibration of Spectacular AI's SDK", "write its cameras as Kalibr's chain: imuToCamera as T_cam_imu"},
       {{"[LEFT_CAM_"}, "a calibration of a ZED's cameras, without their place on the IMU", kCalibrate},
       {{"config.optical_flow"}, "Basalt's configuration", "give its calibration.json"},
@@ -81,6 +93,15 @@ const std::vector<Kind>& kinds() {
       {{"T_BS", "sensor_type"}, "a sensor.yaml of EuRoC", "give the folder that has cam0 and imu0"},
       {{"M1:", "D1:"}, "OpenCV's calibration of a stereo pair, without its place on the IMU", kCalibrate},
       {{"stereo_calibration"}, "a calibration of a stereo pair, without its place on the IMU", kCalibrate},
+      {{"P0:", "P1:"},
+       "KITTI's calibration of rectified images, without the cameras' place on the IMU",
+       "write its cameras as Kalibr's chain: fx, cx, cy of P0 and P1 without distortion, and the shift -P1[3] / fx between them"},
+      {{"VERTEX_SE3:QUAT"},
+       "a graph of poses in g2o's form, without times",
+       "poses with stamps are compared, as TUM's or EuRoC's rows"},
+      {{"Image list with two lines of data per image"},
+       "COLMAP's list of images, with poses but without stamps",
+       "poses with stamps are compared, as TUM's or EuRoC's rows"},
       {{"Camera list with one line of data per camera"}, "COLMAP's list of cameras, without their place on the IMU", kCalibrate},
       {{"cam_left", "T_cam_left"}, "a configuration of cameras", kAsKalibr},
       {{"estimator:"}, "a configuration of this program", "give it by --config"},

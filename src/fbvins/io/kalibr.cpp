@@ -21,6 +21,21 @@ Pose<C0, B> read_next_camera(YamlReader& yaml, const YAML::Node& camera, const P
   return read_transform<C0, C0>(yaml, camera, "T_cn_cnm1") * T_before_B;
 }
 
+/// imu_utils: the averages of three axes. Its "white noise" is that of Kalibr's density for the rate of 1 Hz that its older
+/// versions assume; newer ones give it times the root of the rate, which they do not write: the larger figure is the safe one.
+/// Its bias instability stands for the random walk.
+ImuNoise imu_utils_noise(YamlReader& yaml) {
+  ImuNoise noise;
+  const auto figure = [&](const char* sensor, const char* name) {
+    return yaml.positive(yaml.get(yaml.get(yaml.root(), sensor), "avg-axis"), name);
+  };
+  noise.gyro_noise_density_radps_rthz = figure("Gyr", "gyr_n");
+  noise.gyro_random_walk_radps2_rthz = figure("Gyr", "gyr_w");
+  noise.accel_noise_density_mps2_rthz = figure("Acc", "acc_n");
+  noise.accel_random_walk_mps3_rthz = figure("Acc", "acc_w");
+  return noise;
+}
+
 }  // namespace
 
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read) {
@@ -45,6 +60,10 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
 }
 
 Result<ImuNoise> parse_imu(YamlReader yaml, const ImuNoise& otherwise, const std::string& name) {
+  if (yaml.has(yaml.root(), "Gyr") && yaml.has(yaml.root(), "Acc")) {
+    const ImuNoise noise = imu_utils_noise(yaml);
+    return yaml.ok() ? Result<ImuNoise>(noise) : yaml.error();
+  }
   if (is_realsense_imu(yaml)) {
     ImuNoise noise = otherwise;
     noise.axes = read_realsense_imu(yaml);

@@ -74,33 +74,12 @@ StereoRig seen_from(const StereoRig& rig, const ImuPlace& imu) {
   return out;
 }
 
-/// imu_utils: the averages of three axes. Its "white noise" is that of Kalibr's density for the rate of 1 Hz that its older
-/// versions assume; newer ones give it times the root of the rate, which they do not write: the larger figure is the safe one.
-/// Its bias instability stands for the random walk.
-ImuNoise imu_utils_noise(YamlReader& yaml) {
-  ImuNoise noise;
-  const auto figure = [&](const char* sensor, const char* name) {
-    return yaml.positive(yaml.get(yaml.get(yaml.root(), sensor), "avg-axis"), name);
-  };
-  noise.gyro_noise_density_radps_rthz = figure("Gyr", "gyr_n");
-  noise.gyro_random_walk_radps2_rthz = figure("Gyr", "gyr_w");
-  noise.accel_noise_density_mps2_rthz = figure("Acc", "acc_n");
-  noise.accel_random_walk_mps3_rthz = figure("Acc", "acc_w");
-  return noise;
-}
-
 }  // namespace
 
 Result<StereoRig> with_imu_text(const StereoRig& rig, const std::string& file, const std::string& text,
                                 const std::string& which) {
   YamlReader yaml(file, text);
   if (!yaml.ok()) return yaml.error();
-  if (yaml.has(yaml.root(), "Gyr") && yaml.has(yaml.root(), "Acc")) {
-    StereoRig out = rig;
-    out.imu_noise = imu_utils_noise(yaml);
-    if (!yaml.ok()) return yaml.error();
-    return out;
-  }
   const std::optional<ImuPlace> imu = chosen(yaml, which);
   if (!imu) return yaml.error();
   const Result<ImuNoise> noise = parse_imu({file, text}, rig.imu_noise, imu->name.empty() ? "imu0" : imu->name);

@@ -14,6 +14,7 @@
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_images.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 #include "fbvins/io/rig_text.hpp"
@@ -226,9 +227,9 @@ class RecordReader {
     if (!*rig) return rig->error();
     out_.rig = **rig;
     if (options_.kalibr_imu.empty()) return {};
-    const Result<ImuNoise> given = load_imu(options_.kalibr_imu, out_.rig.imu_noise);
+    const Result<StereoRig> given = with_imu_file(out_.rig, options_.kalibr_imu);
     if (!given) return given.error();
-    out_.rig.imu_noise = *given;
+    out_.rig = *given;
     return {};
   }
 

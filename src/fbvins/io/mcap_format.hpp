@@ -5,6 +5,7 @@
 // content. Messages lie in chunks, each followed by an index of its messages.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -40,6 +41,9 @@ inline constexpr std::size_t kMcapChunkHead_bytes = kMcapRecordHead_bytes + 8 + 
 inline constexpr std::size_t kMcapMessageHead_bytes = 2 + 4 + 8 + 8;
 /// Of a message index: stamp and offset.
 inline constexpr std::size_t kMcapIndexEntry_bytes = 16;
+
+/// Channels count from 1: some readers take 0 for none.
+constexpr std::uint16_t mcap_channel_id(std::size_t topic) { return static_cast<std::uint16_t>(topic + 1); }
 
 /// The checksum of zip and PNG. Continues from `so_far`.
 std::uint32_t crc32_of(std::string_view bytes, std::uint32_t so_far = 0);

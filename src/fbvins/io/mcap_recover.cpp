@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "fbvins/io/mcap_reader.hpp"
@@ -53,16 +55,35 @@ Result<Contents> survey(const std::string& path) {
   return out;
 }
 
-Result<void> write(const Contents& contents, McapReader& reader, McapWriter& writer, const McapPart& part, int& written) {
+/// Gives topics other names.
+Result<void> rename(Contents& contents, const McapPart& part, const std::string& path) {
+  for (const auto& [before, after] : part.names) {
+    const auto at = contents.numbers.find(before);
+    if (at == contents.numbers.end())
+      return Error{ErrorCode::invalid_argument, fmt::format("{}: has no topic '{}'", path, before)};
+    contents.topics[at->second].topic = after;
+  }
+  std::set<std::string> names;
+  for (const McapTopic& topic : contents.topics)
+    if (!names.insert(topic.topic).second)
+      return Error{ErrorCode::invalid_argument, fmt::format("{}: two topics would be '{}'", path, topic.topic)};
+  return {};
+}
+
+Result<void> write(Contents& contents, McapReader& reader, McapWriter& writer, const McapPart& part) {
+  RecoveredMcap& written = contents.found;
   for (const McapAttachment& a : contents.attachments)
     if (Result<void> done = writer.attach(a.name, a.media_type, a.data); !done) return done;
   for (const McapMetadata& m : contents.metadata)
     if (Result<void> done = writer.add_metadata(m.name, m.values); !done) return done;
   while (const auto message = reader.next()) {
     if (message->log_time < part.from || message->log_time >= part.to) continue;
-    writer.begin_message(contents.numbers.at(message->channel->topic), message->log_time) += message->data;
+    const std::size_t topic = contents.numbers.at(message->channel->topic);
+    writer.begin_message(topic, message->log_time) += message->data;
     writer.end_message();
-    ++written;
+    written.first = written.messages == 0 ? message->log_time : std::min(written.first, message->log_time);
+    written.last = written.messages == 0 ? message->log_time : std::max(written.last, message->log_time);
+    ++written.messages, ++written.topics[topic].messages;
     if (writer.waiting_bytes() < kLargeChunk_bytes) continue;
     if (Result<void> done = writer.flush(); !done) return done;
   }
@@ -74,12 +95,14 @@ Result<void> write(const Contents& contents, McapReader& reader, McapWriter& wri
 Result<RecoveredMcap> recover_mcap(const std::string& in, const std::string& out, const McapPart& part) {
   Result<Contents> contents = survey(in);
   if (!contents) return contents.error();
+  if (Result<void> done = rename(*contents, part, in); !done) return done.error();
   Result<McapReader> reader = open(in);
   if (!reader) return reader.error();
   Result<McapWriter> writer = McapWriter::create(out, {"ros2", "fbvins"}, contents->topics);
   if (!writer) return writer.error();
   contents->found.messages = 0;
-  const Result<void> written = write(*contents, *reader, *writer, part, contents->found.messages);
+  for (const McapTopic& topic : contents->topics) contents->found.topics.push_back({topic.topic, topic.type, 0});
+  const Result<void> written = write(*contents, *reader, *writer, part);
   if (!written) {
     std::error_code ignored;
     std::filesystem::remove(out, ignored);

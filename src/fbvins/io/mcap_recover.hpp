@@ -5,7 +5,9 @@
 //   Result<RecoveredMcap> done = recover_mcap("cut.mcap", "whole.mcap", {});
 #pragma once
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
@@ -13,18 +15,26 @@
 namespace fbvins {
 
 struct RecoveredMcap {
+  struct Topic {
+    std::string name, type;
+    int messages = 0;
+  };
   int messages = 0;
-  int parts_left_out = 0;    ///< damaged
-  std::string first_damage;  ///< "file: byte N: sentence"
+  std::vector<Topic> topics;  ///< as written
+  Time first, last;           ///< messages written
+  int parts_left_out = 0;     ///< damaged
+  std::string first_damage;   ///< "file: byte N: sentence"
   bool was_cut_off = false;
 };
 
 /// Only messages recorded in [from, to).
 struct McapPart {
   Time from{0}, to{std::int64_t{1} << 62};
+  std::map<std::string, std::string> names = {};  ///< topics that get another name
 };
 
-/// An error where `in` is no such file, holds no message, or `out` exists already or cannot be written.
+/// An error where `in` is no such file, holds no message, or `out` exists already or cannot be written; where a topic that gets
+/// another name is not there, or two would have one name.
 Result<RecoveredMcap> recover_mcap(const std::string& in, const std::string& out, const McapPart& part = {});
 
 }  // namespace fbvins

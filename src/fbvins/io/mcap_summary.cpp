@@ -41,7 +41,7 @@ std::string McapWriter::statistics() const {
   std::uint64_t messages = 0;
   for (std::size_t id = 0; id < channels_.size(); ++id) {
     if (channels_[id].written == 0) continue;
-    append_le(counts, static_cast<std::uint16_t>(id));
+    append_le(counts, mcap_channel_id(id));
     append_le(counts, channels_[id].written);
     messages += channels_[id].written;
   }

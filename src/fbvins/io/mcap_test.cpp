@@ -18,6 +18,7 @@
 #include "fbvins/io/mcap_reader.hpp"
 #include "fbvins/io/mcap_recover.hpp"
 #include "fbvins/io/mcap_writer.hpp"
+#include "fbvins/io/rosbag2_folder.hpp"
 
 namespace fbvins {
 namespace mcap_test {
@@ -200,7 +201,7 @@ TEST_F(Mcap, RecoveredFilesAreWhole) {
   McapReader reader = reader_of(*read_file(again, 1u << 20u));
   EXPECT_EQ(read_all(reader), said);
   EXPECT_FALSE(reader.damage().no_summary);
-  EXPECT_EQ(reader.channels().at(0).definition, "int32 a\n");
+  EXPECT_EQ(reader.channels().at(1).definition, "int32 a\n");
   ASSERT_EQ(reader.attachments().size(), 1u);
   EXPECT_EQ(reader.attachments()[0].media_type, "text/plain");
   ASSERT_EQ(reader.metadata().size(), 1u);
@@ -209,6 +210,41 @@ TEST_F(Mcap, RecoveredFilesAreWhole) {
   const auto part = recover_mcap(path_, folder_ + "/part.mcap", {Time{1010}, Time{1015}});
   ASSERT_TRUE(part) << part.error().message;
   EXPECT_EQ(part->messages, 5);
+}
+
+TEST_F(Mcap, TopicsGetOtherNames) {
+  write_thirty(true);
+  const std::string out = folder_ + "/named.mcap";
+  const auto done = recover_mcap(path_, out, {.names = {{kTopics[0].topic, "/other"}}});
+  ASSERT_TRUE(done) << done.error().message;
+  ASSERT_EQ(done->topics.size(), 2u);
+  EXPECT_EQ(done->topics[0].messages + done->topics[1].messages, 30);
+  EXPECT_EQ(done->first.ns, 1000);
+  EXPECT_EQ(done->last.ns, 1029);
+  McapReader reader = reader_of(*read_file(out, 1u << 20u));
+  for (const Said& said : read_all(reader)) EXPECT_TRUE(said.topic == "/other" || said.topic == kTopics[1].topic) << said.topic;
+  const auto refused = [&](const std::map<std::string, std::string>& names) {
+    return recover_mcap(path_, folder_ + "/no.mcap", {.names = names}).error().message;
+  };
+  EXPECT_EQ(refused({{"/nope", "/a"}}), path_ + ": has no topic '/nope'");
+  EXPECT_EQ(refused({{kTopics[0].topic, kTopics[1].topic}}), path_ + ": two topics would be '" + kTopics[1].topic + "'");
+  EXPECT_FALSE(fs::exists(folder_ + "/no.mcap"));
+}
+
+TEST_F(Mcap, AFolderOfRosbag2HasItsMetadata) {
+  write_thirty(true);
+  const std::string out = folder_ + "/a \"bag\"";
+  const auto done = write_rosbag2(path_, out + "/");
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_TRUE(fs::exists(out + "/a \"bag\"_0.mcap"));
+  const std::string metadata = *read_file(out + "/metadata.yaml", 1u << 20u);
+  for (const char* line : {"version: 5", "storage_identifier: mcap", "message_count: 30\n  topics",
+                           "nanoseconds_since_epoch: 1000\n", "duration:\n    nanoseconds: 29\n", "- \"a \\\"bag\\\"_0.mcap\""})
+    EXPECT_NE(metadata.find(line), std::string::npos) << line << "\n" << metadata;
+  EXPECT_EQ(write_rosbag2(path_, out).error().message, out + ": exists already");
+  EXPECT_FALSE(write_rosbag2(path_, folder_ + "/none/below"));
+  EXPECT_FALSE(write_rosbag2(folder_ + "/nothing.mcap", folder_ + "/of_nothing"));
+  EXPECT_FALSE(fs::exists(folder_ + "/of_nothing")) << "nothing is left of what failed";
 }
 
 TEST_F(Mcap, NothingWaitsInMemoryAfterFlush) {

@@ -85,7 +85,7 @@ McapWriter::McapWriter(std::string path, FileDescriptor file, const std::vector<
   for (std::size_t id = 0; id < topics.size(); ++id) {
     const auto [schema, is_new] = schema_of.try_emplace(topics[id].type, static_cast<std::uint16_t>(schema_of.size() + 1));
     if (is_new) append_schema(schemas_, schema->second, topics[id]);
-    append_channel(channel_records_, static_cast<std::uint16_t>(id), schema->second, topics[id]);
+    append_channel(channel_records_, mcap_channel_id(id), schema->second, topics[id]);
   }
   schema_count_ = static_cast<int>(schema_of.size());
   clear_chunk();
@@ -188,7 +188,7 @@ std::string& McapWriter::begin_message(std::size_t topic, Time t) {
   append_le(to.waiting_index, stamp);
   append_le(to.waiting_index, static_cast<std::uint64_t>(chunk_.size() - kMcapChunkHead_bytes));
   message_ = begin_mcap_record(chunk_, McapRecord::message);
-  append_le(chunk_, static_cast<std::uint16_t>(topic));
+  append_le(chunk_, mcap_channel_id(topic));
   append_le(chunk_, to.next_sequence++);
   append_le(chunk_, stamp);  // recorded
   append_le(chunk_, stamp);  // published
@@ -216,7 +216,7 @@ void McapWriter::close_chunk() {
   for (std::size_t id = 0; id < channels_.size(); ++id) {
     if (channels_[id].waiting_index.empty()) continue;
     const std::size_t start = begin_mcap_record(chunk_, McapRecord::message_index);
-    append_le(chunk_, static_cast<std::uint16_t>(id));
+    append_le(chunk_, mcap_channel_id(id));
     append_mcap_text(chunk_, channels_[id].waiting_index);
     end_mcap_record(chunk_, start);
   }

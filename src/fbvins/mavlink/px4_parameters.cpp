@@ -10,6 +10,8 @@ namespace {
 
 constexpr bool kReboot = true;
 constexpr const char* kImuPlace[] = {"EKF2_IMU_POS_X", "EKF2_IMU_POS_Y", "EKF2_IMU_POS_Z"};
+constexpr const char* kDdsPort = "UXRCE_DDS_CFG";
+constexpr int kTelem2 = 102, kEthernet = 1000;  ///< ports in PX4's parameters
 
 Px4Parameter whole(const char* name, double value, const char* why, bool reboot = false) {
   return {name, value, true, reboot, why};
@@ -20,11 +22,12 @@ Px4Parameter real(const char* name, double value, const char* why, bool reboot =
 
 void add_link(const Px4VisionSetup& setup, std::vector<Px4Parameter>& out) {
   if (setup.link == Px4Link::serial) {
-    out.push_back(whole("MAV_1_CONFIG", 102, "MAVLink on TELEM 2", kReboot));
+    out.push_back(whole("MAV_1_CONFIG", kTelem2, "MAVLink on TELEM 2", kReboot));
     out.push_back(whole("MAV_1_MODE", 2, "messages for an onboard computer", kReboot));
+    out.push_back(whole("MAV_1_FLOW_CTRL", 0, "nothing is sent where flow control waits for wires that are not there", kReboot));
     out.push_back(whole("SER_TEL2_BAUD", 921600, "50 poses a second take 12 kB/s", kReboot));
   } else if (setup.link == Px4Link::ethernet) {
-    out.push_back(whole("MAV_2_CONFIG", 1000, "MAVLink on Ethernet", kReboot));
+    out.push_back(whole("MAV_2_CONFIG", kEthernet, "MAVLink on Ethernet", kReboot));
     out.push_back(whole("MAV_2_MODE", 2, "messages for an onboard computer", kReboot));
     out.push_back(whole("MAV_2_UDP_PRT", 14550, "the port of --mavlink udp:HOST:14550", kReboot));
     out.push_back(whole("MAV_2_REMOTE_PRT", 14540, "the own port of --mavlink", kReboot));
@@ -69,6 +72,10 @@ std::vector<Px4Parameter> px4_parameters(const Px4VisionSetup& setup) {
   out.back().at_least = true;
   for (const char* name : {"EKF2_EV_POS_X", "EKF2_EV_POS_Y", "EKF2_EV_POS_Z"})
     out.push_back(real(name, 0, "the place of the IMU is in live.mavlink.mounting"));
+  if (!setup.gps) {
+    out.push_back(whole("EKF2_NOAID_TOUT", 1000000, "how long it flies on blind before Position mode ends [us]"));
+    out.back().at_most = true;
+  }
   out.push_back(whole("MAV_SYS_ID", setup.system_id, "live.mavlink.system_id names the same vehicle", kReboot));
   add_link(setup, out);
   return out;
@@ -89,12 +96,12 @@ std::vector<std::string> px4_parameter_names(const Px4VisionSetup& setup) {
   std::vector<std::string> out;
   for (const Px4Parameter& p : px4_parameters(setup)) out.push_back(p.name);
   for (const char* name : kImuPlace) out.emplace_back(name);
+  if (setup.link == Px4Link::serial) out.emplace_back(kDdsPort);
   return out;
 }
 
 std::vector<Px4Finding> judge_px4(const Px4VisionSetup& setup, const std::map<std::string, double>& values) {
   std::vector<Px4Finding> out;
-  bool reboot = false;
   for (const Px4Parameter& p : px4_parameters(setup)) {
     const auto found = values.find(p.name);
     if (found == values.end()) {
@@ -106,9 +113,14 @@ std::vector<Px4Finding> judge_px4(const Px4VisionSetup& setup, const std::map<st
           {true, p.name,
            fmt::format("{} is {}, and should be {}{}: {}{}", p.name, number(p, found->second), bound, number(p, p.value), p.why,
                        p.reboot ? " (restart the flight controller after the change)" : "")});
-      reboot |= p.reboot;
     }
   }
+  if (const auto dds = values.find(kDdsPort); setup.link == Px4Link::serial && dds != values.end() && dds->second == kTelem2)
+    out.push_back(
+        {true, kDdsPort,
+         fmt::format("{} is {}: uXRCE-DDS has TELEM 2, too; 0, or another port (restart the flight controller after the "
+                     "change)",
+                     kDdsPort, kTelem2)});
   for (const char* name : kImuPlace)
     if (const auto found = values.find(name); found != values.end() && found->second != 0)
       out.push_back(

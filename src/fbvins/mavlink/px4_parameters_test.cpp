@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
+
 #include "fbvins/mavlink/messages.hpp"
 
 namespace fbvins {
@@ -44,6 +47,32 @@ TEST(Px4Parameters, ThereIsAHeightWhenVisionFails) {
   EXPECT_EQ(as_wanted({})["EKF2_HGT_REF"], 3) << "vision's, while there is vision";
   EXPECT_EQ(as_wanted({})["EKF2_BARO_CTRL"], 1);
   EXPECT_EQ(as_wanted({.barometer = false})["EKF2_BARO_CTRL"], 0);
+}
+
+TEST(Px4Parameters, BlindFlightEndsAfterASecondWhereThereIsNothingBesideVision) {
+  EXPECT_EQ(as_wanted({})["EKF2_NOAID_TOUT"], 1000000);
+  EXPECT_FALSE(as_wanted({.gps = true}).contains("EKF2_NOAID_TOUT"));
+  auto values = as_wanted({});
+  values["EKF2_NOAID_TOUT"] = 5000000;
+  const auto found = judge_px4({}, values);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].sentence.find("should be at most 1000000"), std::string::npos) << found[0].sentence;
+  values["EKF2_NOAID_TOUT"] = 500000;
+  EXPECT_TRUE(judge_px4({}, values).empty());
+}
+
+TEST(Px4Parameters, TwoProgramsOnOnePortAreNamed) {
+  const Px4VisionSetup serial{.link = Px4Link::serial};
+  auto values = as_wanted(serial);
+  values["UXRCE_DDS_CFG"] = 102;
+  const auto found = judge_px4(serial, values);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].wrong);
+  EXPECT_NE(found[0].sentence.find("uXRCE-DDS has TELEM 2, too"), std::string::npos);
+  values["UXRCE_DDS_CFG"] = 101;
+  EXPECT_TRUE(judge_px4(serial, values).empty());
+  EXPECT_EQ(std::ranges::count(px4_parameter_names(serial), "UXRCE_DDS_CFG"), 1);
+  EXPECT_EQ(std::ranges::count(px4_parameter_names({}), "UXRCE_DDS_CFG"), 0);
 }
 
 TEST(Px4Parameters, TheFileHasARowForEach) {
