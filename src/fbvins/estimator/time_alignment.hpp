@@ -11,7 +11,7 @@
 #pragma once
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/estimator/gyro_alignment.hpp"
+#include "fbvins/imu/gyro_alignment.hpp"
 
 namespace fbvins {
 
@@ -19,7 +19,8 @@ class TimeAlignment {
  public:
   TimeAlignment(const StereoRig& rig, bool enabled);
 
-  /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight.
+  /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight, and where
+  /// the line delay is another from here on.
   bool add(const TrackedFrame& frame, bool running);
   /// Whether enough was seen to notice an offset that would spoil a start in motion.
   bool known() const {
@@ -38,7 +39,7 @@ class TimeAlignment {
   static constexpr double kForgotten_s = 3;
   /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
   static constexpr int kFewestForStart = 8, kEnoughForStart = 24;
-  static constexpr double kPreciseForStart_s = 0.004;
+  static constexpr double kPreciseForStart_s = 0.005;
   /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
   static constexpr int kLongestWait = 40;
   void solve(bool running);
