@@ -65,9 +65,15 @@ Vec3 normal3(Rng& rng, double sigma) {
   return sigma * Vec3(x, y, z);
 }
 
+/// Share of the focal length, and of the principal point in px.
+Vec3 lens_error(const CalibrationErrorOptions& error, Rng& rng) {
+  const double focal = rng.normal(), x = rng.normal(), y = rng.normal();
+  return {error.focal_share * focal, error.centre_px * x, error.centre_px * y};
+}
+
 /// The lens as a calibration has it. Other models than these keep what they are.
-Camera miscalibrated(const Camera& camera, const CalibrationErrorOptions& error, Rng& rng) {
-  const double focal = 1 + error.focal_share * rng.normal(), x_px = error.centre_px * rng.normal(), y_px = error.centre_px * rng.normal();
+Camera miscalibrated(const Camera& camera, const CalibrationErrorOptions& error, const Vec3& by) {
+  const double focal = 1 + by.x(), x_px = by.y(), y_px = by.z();
   if (camera.model_name() != "pinhole-radtan") return camera;
   const auto f = camera.intrinsics();
   std::vector<double> k = camera.distortion();
@@ -121,8 +127,12 @@ StereoRig calibrated_rig(const SimulationOptions& o, StereoRig rig) {
   const CalibrationErrorOptions& error = o.calibration_error;
   if (error == CalibrationErrorOptions{} && o.sensors == "none") return rig;
   Rng rng(static_cast<std::uint64_t>(o.seed), 64);
-  rig.left = miscalibrated(rig.left, error, rng);
-  if (rig.has_right()) rig.right = miscalibrated(rig.right, error, rng);
+  const Vec3 of_left = lens_error(error, rng);
+  rig.left = miscalibrated(rig.left, error, of_left);
+  if (rig.has_right()) {
+    const Vec3 own = lens_error(error, rng);
+    rig.right = miscalibrated(rig.right, error, error.pair_share < 1 ? Vec3(of_left + error.pair_share * own) : own);
+  }
   const Pose<B, B> moved(so3_exp(normal3(rng, error.mounting_deg * kDegree)), normal3(rng, 1e-3 * error.place_mm));
   if (error.mounting_deg > 0 || error.place_mm > 0) {
     rig.T_BC0 = moved * rig.T_BC0;

@@ -28,6 +28,7 @@ namespace fbvins {
 struct CalibrationErrorOptions {
   double focal_share = 0;
   double centre_px = 0;
+  double pair_share = 1;
   double mounting_deg = 0;
   double place_mm = 0;
   double imu_noise_factor = 1;
@@ -40,6 +41,7 @@ struct CalibrationErrorOptions {
   void visit(V&& v) {
     v("focal_share", focal_share, "", "error of each camera's focal length, 0.01 is 1 %", 0.0, 0.2);
     v("centre_px", centre_px, "px", "error of each principal point", 0.0, 50.0);
+    v("pair_share", pair_share, "", "the right camera's errors are the left one's and this share of its own; 1: its own alone", 0.0, 1.0);
     v("mounting_deg", mounting_deg, "deg", "error of the rotation between cameras and IMU, about each axis", 0.0, 45.0);
     v("place_mm", place_mm, "mm", "error of the cameras' place on the IMU, along each axis", 0.0, 500.0);
     v("imu_noise_factor", imu_noise_factor, "", "declared noise densities over the true ones", 1e-3, 1e3);
