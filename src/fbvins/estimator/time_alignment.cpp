@@ -16,7 +16,7 @@ constexpr double kImproved_sigma = 1;
 /// In flight so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
 /// A line delay likewise: global shutters stay what they are.
-constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4;
+constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 5;
 /// In flight the correction is made in steps: a pose must not lie before the one before it.
 constexpr Duration kStep{4'000'000};
 /// Noise of stamps below this is not told from none where tracks are few, and harms less than readings that count for less.
@@ -36,16 +36,17 @@ bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   cut_by_ = frame.imu.time_offset;
   alignment_.add(frame, given_);
   const bool few = !running && alignment_.pairs() <= kEnoughForStart;
+  const double line_delay_before_s = line_delay_s_;
   if (++frames_ % (few ? kEachBefore : kEachInFlight) == 0) solve(running);
   if (correction_ != found_) changed_ = now_;
   const Duration missing = found_ - correction_;
   correction_ = running ? correction_ + std::clamp(missing, -kStep, kStep) : found_;
-  return changed;
+  return changed || line_delay_s_ != line_delay_before_s;
 }
 
 void TimeAlignment::solve(bool running) {
   const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
-  if (!found) return;
+  if (!found || found->pairs < kFewestForStart) return;
   sigma_s_ = found->time_offset_sigma_s();
   solves_ = std::min(solves_ + 1, kSolvesOfNoise);
   jitter_s_ += (found->stamp_sigma_s - jitter_s_) / solves_;
@@ -55,7 +56,8 @@ void TimeAlignment::solve(bool running) {
   if (off_ >= (running ? kInARow : 1))
     found_ = Duration::from_seconds(found->time_offset_s());
   const double line_off_s = std::abs(found->line_delay_s() - line_delay_s_);
-  if (line_off_s > kLeastLine_s && line_off_s > kCertainLine_sigma * found->line_delay_sigma_s()) line_delay_s_ = found->line_delay_s();
+  if (found->pairs < kEnoughForStart || line_off_s < std::max(kLeastLine_s, kCertainLine_sigma * found->line_delay_sigma_s())) return;
+  line_delay_s_ = found->line_delay_s();
 }
 
 double TimeAlignment::stamp_sigma_s() const {

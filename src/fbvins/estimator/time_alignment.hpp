@@ -11,7 +11,7 @@
 #pragma once
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/estimator/gyro_alignment.hpp"
+#include "fbvins/imu/gyro_alignment.hpp"
 
 namespace fbvins {
 
@@ -19,7 +19,8 @@ class TimeAlignment {
  public:
   TimeAlignment(const StereoRig& rig, bool enabled);
 
-  /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight.
+  /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight, and where
+  /// the line delay is another from here on.
   bool add(const TrackedFrame& frame, bool running);
   /// Whether enough was seen to notice an offset that would spoil a start in motion.
   bool known() const {

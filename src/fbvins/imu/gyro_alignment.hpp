@@ -6,13 +6,17 @@
 //   alignment.add(frame);                                   // each tracked frame
 //   if (const auto found = alignment.solve()) use(found->time_offset_s, found->time_offset_sigma_s());
 //
-// One owner, one thread. Memory: the newest 150 pairs of images of at most 40 tracks, and their readings.
+// One owner, one thread. Memory: the newest pairs of images of at most 40 tracks, and their readings.
 #pragma once
 
+#include <cmath>
 #include <deque>
 #include <optional>
 #include <vector>
 
+#include "fbvins/imu/gyro_turns.hpp"
+#include "fbvins/imu/stamp_noise.hpp"
+#include "fbvins/imu/turn_by_tracks.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
@@ -23,18 +27,6 @@ struct GyroAlignmentPrior {
   double time_offset_s = 0.05;     ///< of what is given: cameras behind a driver's buffers are late by up to a tenth of a second
   double line_delay_s = 40e-6;     ///< the common sensors take 10 to 100 us a row
   double rotation_rad = 0.02;      ///< of a mounting by its drawing
-};
-
-/// What the second stamp of a pair of images is off by, where it shows, and its variance by the tracks' noise.
-struct LateImage {
-  Time from, to;
-  double s, known_s2;
-};
-
-/// Directions of a track in two images, in the body's axes, and their rows from the middle.
-struct SeenTwice {
-  Vec3 a, b;
-  double sigma, rows_a, rows_b;
 };
 
 /// Corrections of what the rig says.
@@ -62,10 +54,12 @@ class GyroAlignment {
  public:
   /// The largest offset, in both directions, that is looked for.
   static constexpr double kLargestOffset_s = 0.1;
+  /// The newest ones are kept: 7.5 s at 20 Hz.
+  static constexpr std::size_t kMostPairs = 150;
 
   /// `line_delay_s`: the rig's; what is found is in addition to it.
-  GyroAlignment(const Mat3& R_BC, double middle_row_px, double line_delay_s, const GyroAlignmentPrior& prior)
-      : R_BC_(R_BC), middle_row_px_(middle_row_px), line_delay_s_(line_delay_s), prior_(prior) {}
+  GyroAlignment(const Mat3& R_BC, double middle_row_px, double line_delay_s, const GyroAlignmentPrior& prior, std::size_t most_pairs = kMostPairs)
+      : R_BC_(R_BC), middle_row_px_(middle_row_px), line_delay_s_(line_delay_s), prior_(prior), most_pairs_(most_pairs) {}
 
   /// A frame with the readings since the one before. `given`: the rig's time offset; the segment says with which it was cut.
   void add(const TrackedFrame& frame, Duration given);
@@ -88,36 +82,44 @@ class GyroAlignment {
     Time from, to;
     std::vector<SeenTwice> tracks;
   };
-  struct Rotation {
-    Time t;
-    Quat q;  ///< of the readings since the first, without bias
+  /// A pair's tracks, compared with one turn: what they say of turns that differ little follows without them.
+  struct Compared {
+    bool yet = false;
+    PredictedTurnOfPair turn;
+    TurnError error;
   };
   struct Normal {
     GyroAlignmentEstimate::Mat H = GyroAlignmentEstimate::Mat::Zero();
     GyroAlignmentEstimate::Vec g = GyroAlignmentEstimate::Vec::Zero();
     double cost = 0;
     double rows = 0;
-    std::vector<LateImage> late;
+    int compared = 0;  ///< pairs whose tracks had to be
   };
+  struct Turned;
 
-  void add_readings(const ImuSegment& segment);
+  void forget();
+  View view_of(const TrackedFrame& frame, Time t) const;
   void make_pairs();
-  Quat orientation(Time t) const;
-  Vec3 rate(Time t) const;
-  Normal linearise(const GyroAlignmentEstimate::Vec& x) const;
-  void add_pair(const Pair& pair, const GyroAlignmentEstimate::Vec& x, Normal& out) const;
-  GyroAlignmentEstimate solve_from(const GyroAlignmentEstimate::Vec& x) const;
+  void add_pair(const View& a, const View& b);
+  Turned turned(const Pair& pair, const GyroAlignmentEstimate::Vec& x) const;
+  Normal linearise(const GyroAlignmentEstimate::Vec& x, std::deque<Compared>& compared) const;
+  double difference_sigmas(const Pair& pair, const Compared& compared, const Turned& now) const;
+  GyroAlignmentEstimate solve_from(const GyroAlignmentEstimate::Vec& x, std::deque<Compared>& compared) const;
+  void search(GyroAlignmentEstimate& best);
+  std::vector<LateImage> late_images(const GyroAlignmentEstimate::Vec& x) const;
 
   Mat3 R_BC_;
   double middle_row_px_, line_delay_s_;
   GyroAlignmentPrior prior_;
+  std::size_t most_pairs_;
   std::deque<View> views_;  ///< whose pairs are not made yet, and those before that they are compared with
   std::size_t paired_ = 0;  ///< of these
   std::deque<Pair> pairs_;
-  std::deque<Rotation> turned_;
-  std::optional<Vec3> last_rate_;
+  std::deque<Compared> compared_;  ///< each pair near the last solution
+  GyroTurns turns_;
   GyroAlignmentEstimate::Vec last_ = GyroAlignmentEstimate::Vec::Zero();
   bool settled_ = false;
+  std::size_t searched_ = 0;  ///< with so many pairs
 };
 
 }  // namespace fbvins

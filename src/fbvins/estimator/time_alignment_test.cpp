@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/time_alignment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fbvins/imu/carried_by_hand.hpp"
+
+namespace fbvins {
+namespace time_alignment_test {
+
+using namespace carried_by_hand;
+
+TEST(TimeAlignment, AKnownOffsetIsLeftAsItIsAndAWrongOneIsCorrected) {
+  for (const double late_s : {0.0, 0.04}) {
+    TimeAlignment alignment(StereoRig{}, true);
+    Hand hand;
+    hand.middle_px = 0;  // as in a rig without sizes
+    hand.late_s = late_s;
+    for (const TrackedFrame& frame : hand.frames(2)) alignment.add(frame, false);
+    EXPECT_NEAR(alignment.correction().seconds(), -late_s, 0.002);
+  }
+}
+
+TEST(TimeAlignment, InFlightItIsCorrectedInSteps) {
+  TimeAlignment alignment(StereoRig{}, true);
+  Hand hand;
+  hand.late_s = 0.04, hand.middle_px = 0;
+  Duration before{};
+  for (const TrackedFrame& frame : hand.frames(4)) {
+    alignment.add(frame, true);
+    EXPECT_LE(std::abs((alignment.correction() - before).seconds()), 0.0041);
+    before = alignment.correction();
+  }
+  EXPECT_NEAR(before.seconds(), -0.04, 0.002);
+}
+
+}  // namespace time_alignment_test
+}  // namespace fbvins
