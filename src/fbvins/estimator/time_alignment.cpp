@@ -15,8 +15,8 @@ constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
 constexpr double kImproved_sigma = 1;
 /// In flight so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
-/// A line delay likewise: global shutters stay what they are.
-constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 5;
+/// A line delay likewise: global shutters stay what they are. Where the offset was wrong nobody has calibrated the line delay, either.
+constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma = 2.5;
 /// In flight the correction is made in steps: a pose must not lie before the one before it.
 constexpr Duration kStep{4'000'000};
 /// Noise of stamps below this is not told from none where tracks are few, and harms less than readings that count for less.
@@ -56,7 +56,8 @@ void TimeAlignment::solve(bool running) {
   if (off_ >= (running ? kInARow : 1))
     found_ = Duration::from_seconds(found->time_offset_s());
   const double line_off_s = std::abs(found->line_delay_s() - line_delay_s_);
-  if (found->pairs < kEnoughForStart || line_off_s < std::max(kLeastLine_s, kCertainLine_sigma * found->line_delay_sigma_s())) return;
+  const double line_sigmas = found_ == Duration{} ? kCertainLine_sigma : kDoubtedLine_sigma;
+  if (found->pairs < kEnoughForStart || line_off_s < std::max(kLeastLine_s, line_sigmas * found->line_delay_sigma_s())) return;
   line_delay_s_ = found->line_delay_s();
 }
 

@@ -39,7 +39,7 @@ class TimeAlignment {
   static constexpr double kForgotten_s = 3;
   /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
   static constexpr int kFewestForStart = 8, kEnoughForStart = 24;
-  static constexpr double kPreciseForStart_s = 0.004;
+  static constexpr double kPreciseForStart_s = 0.005;
   /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
   static constexpr int kLongestWait = 40;
   void solve(bool running);

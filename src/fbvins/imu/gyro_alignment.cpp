@@ -12,7 +12,7 @@ namespace {
 constexpr double kApart_s = 0.09;
 constexpr double kMostApart_s = 0.3;
 constexpr std::size_t kMostTracks = 40, kFewestTracks = 12;
-constexpr Duration kMargin = Duration{static_cast<std::int64_t>(1e9 * GyroAlignment::kLargestOffset_s)} + GyroTurns::kRateOver;
+constexpr Duration kMargin = Duration{static_cast<std::int64_t>(1e9 * GyroAlignment::kLargestOffset_s)} + GyroTurns::kMostSide;
 constexpr int kMostSteps = 10;
 /// Of a step after which tracks were compared anew: their weights follow the directions of parallax, which follow the unknowns, and
 /// full steps swing to and fro.
@@ -72,12 +72,15 @@ struct GyroAlignment::Turned {
 
 void GyroAlignment::forget() {
   views_.clear(), pairs_.clear(), compared_.clear();
+  turns_.clear();
   paired_ = 0;
 }
 
 void GyroAlignment::add(const TrackedFrame& frame, Duration given) {
-  if (!turns_.add(frame.imu, frame.t)) forget();
-  views_.push_back(view_of(frame, frame.t + given + frame.offsets.of(0)));
+  const Time t = frame.t + given + frame.offsets.of(0);
+  if (frame.after_clock_step || (!views_.empty() && t < views_.back().t)) forget();
+  turns_.add(frame.imu);
+  views_.push_back(view_of(frame, t));
   make_pairs();
 }
 
@@ -112,7 +115,7 @@ void GyroAlignment::make_pairs() {
 
 void GyroAlignment::add_pair(const View& a, const View& b) {
   const double apart_s = (b.t - a.t).seconds();
-  if (apart_s < kApart_s || apart_s >= kMostApart_s || turns_.first() > a.t - kMargin) return;
+  if (apart_s < kApart_s || apart_s >= kMostApart_s || !turns_.covers(a.t - kMargin, b.t + kMargin)) return;
   std::vector<SeenTwice> tracks;
   auto s = a.sights.begin();
   for (const Sight& seen : b.sights) {
@@ -129,17 +132,23 @@ void GyroAlignment::add_pair(const View& a, const View& b) {
 GyroAlignment::Turned GyroAlignment::turned(const Pair& pair, const Vec8& x) const {
   const Duration offset = Duration::from_seconds(x(3));
   const Time from = pair.from + offset, to = pair.to + offset;
+  const double dt_s = (to - from).seconds();
   const Vec3 bias = x.head<3>();
   const Quat raw = turns_.between(from, to);
-  const Mat3 by_bias = -(to - from).seconds() * so3_right_jacobian(so3_log(raw));
+  const Mat3 by_bias = -dt_s * so3_right_jacobian(so3_log(raw));
   const Mat3 R = (raw * so3_exp(Vec3(by_bias * bias))).toRotationMatrix();
   // The tracks stay in the axes of the mounting as given; the turn is taken there.
   const Mat3 given = so3_exp(Vec3(-x.tail<3>())).toRotationMatrix();
-  const Vec3 rate_a = turns_.rate(from) - bias, rate_b = turns_.rate(to) - bias;
+  const double line_delay_s = line_delay_s_ + x(4);
+  const Duration side = Duration::from_seconds(std::abs(line_delay_s) * middle_row_px_);
+  const auto around = [&](Time t) {
+    const TurnAround turn = turns_.around(t, side);
+    return TurnAround{given * (turn.rate - bias), given * turn.gain};
+  };
   Turned out;
-  out.turn = {given * R * given.transpose(), given * rate_a, given * rate_b, line_delay_s_ + x(4)};
+  out.turn = {given * R * given.transpose(), around(from), around(to), line_delay_s, dt_s};
   out.by_unknowns.topLeftCorner<3, 3>() = given * by_bias;
-  out.by_unknowns.block<3, 1>(0, 3) = given * (rate_b - R.transpose() * rate_a);
+  out.by_unknowns.block<3, 1>(0, 3) = out.turn.around_b.rate - out.turn.R.transpose() * out.turn.around_a.rate;
   out.by_unknowns.topRightCorner<3, 3>() = given * (Mat3::Identity() - R.transpose());
   out.by_unknowns(3, 4) = 1;
   return out;
@@ -148,8 +157,8 @@ GyroAlignment::Turned GyroAlignment::turned(const Pair& pair, const Vec8& x) con
 /// By so many standard deviations of a track the tracks' directions differ from where they were compared.
 double GyroAlignment::difference_sigmas(const Pair& pair, const Compared& compared, const Turned& now) const {
   const Eigen::Vector4d error = now.error(compared.turn);
-  const double rows = middle_row_px_ * (std::abs(error(3)) * now.turn.rate_b.norm() +
-                                        std::abs(now.turn.line_delay_s) * (now.turn.rate_b - compared.turn.rate_b).norm());
+  const double rows = middle_row_px_ * (std::abs(error(3)) * now.turn.around_b.rate.norm() +
+                                        std::abs(now.turn.line_delay_s) * (now.turn.around_b.rate - compared.turn.around_b.rate).norm());
   return std::max(error.head<3>().norm(), rows) / pair.tracks.front().sigma;
 }
 
@@ -183,7 +192,7 @@ std::vector<LateImage> GyroAlignment::late_images(const Vec8& x) const {
     const Turned now = turned(pairs_[i], x);
     const TurnError& e = compared_[i].error;
     const Eigen::Vector4d error = now.error(compared_[i].turn), a = e.a + e.A * error;
-    const Vec3 rate = now.turn.rate_b;
+    const Vec3 rate = now.turn.around_b.rate;
     const double H = rate.dot(e.A.topLeftCorner<3, 3>() * rate), g = rate.dot(a.head<3>());
     if (H <= 1 / (kLateShows_s * kLateShows_s)) continue;
     const double cost = e.cost + error.dot(e.a + a);

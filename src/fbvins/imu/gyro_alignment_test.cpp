@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "fbvins/imu/carried_by_hand.hpp"
 
@@ -109,6 +110,23 @@ TEST(GyroAlignment, PairsThatDoNotFitCountForLittle) {
   ASSERT_TRUE(estimate);
   EXPECT_LT(std::abs(estimate->time_offset_s() + 0.03), 3 * estimate->time_offset_sigma_s());
   EXPECT_NEAR(estimate->time_offset_s(), -0.03, 0.002);
+}
+
+/// Nothing was said of the readings that were lost, and nothing is forgotten.
+TEST(GyroAlignment, AGapTakesNothingButItsPairs) {
+  Hand hand;
+  hand.late_s = 0.03;
+  std::vector<TrackedFrame> frames = hand.frames(4);
+  GyroAlignment whole(Mat3::Identity(), kMiddle_px, 0, {}), gap(Mat3::Identity(), kMiddle_px, 0, {});
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    whole.add(frames[i], {});
+    if (i >= 40 && i < 45) frames[i].imu = {};
+    gap.add(frames[i], {});
+  }
+  EXPECT_LT(gap.pairs(), whole.pairs() - 4);
+  EXPECT_GT(gap.pairs(), whole.pairs() - 20);
+  const auto estimate = gap.solve();
+  EXPECT_LT(std::abs(estimate->time_offset_s() + 0.03), 3 * estimate->time_offset_sigma_s());
 }
 
 TEST(GyroAlignment, NoPairNoEstimate) {

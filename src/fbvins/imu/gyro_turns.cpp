@@ -12,29 +12,36 @@ constexpr double kLongestGap_s = 0.05;
 
 }  // namespace
 
-bool GyroTurns::add(const ImuSegment& segment, Time t) {
-  // Where the offset was corrected downwards a segment may end before it begins.
-  const bool known = !empty() && (t + segment.time_offset - last()).seconds() < kLongestGap_s;
-  const bool whole = segment.empty() ? known : segment.longest_gap.seconds() <= kLongestGap_s;
-  if (!whole) turned_.clear(), last_rate_.reset();
+void GyroTurns::add(const ImuSegment& segment) {
   for (std::size_t k = 1; k + 1 < segment.samples.size(); ++k)
     add_reading(segment.samples[k].t + segment.time_offset, segment.samples[k].gyro_radps);
-  return whole;
+}
+
+void GyroTurns::clear() {
+  turned_.clear(), gaps_.clear();
+  last_rate_.reset();
 }
 
 void GyroTurns::add_reading(Time t, const Vec3& rate) {
   if (!turned_.empty() && t <= turned_.back().t) return;
-  if (last_rate_) {
-    const double dt = (t - turned_.back().t).seconds();
-    turned_.push_back({t, (turned_.back().q * so3_exp(Vec3(0.5 * dt * (*last_rate_ + rate)))).normalized()});
-  } else {
-    turned_.push_back({t, Quat::Identity()});
+  const double dt = turned_.empty() ? 0 : (t - turned_.back().t).seconds();
+  if (dt > kLongestGap_s) {
+    gaps_.push_back({turned_.back().t, t});
+    last_rate_.reset();
   }
+  const Quat before = turned_.empty() ? Quat::Identity() : turned_.back().q;
+  turned_.push_back({t, last_rate_ ? (before * so3_exp(Vec3(0.5 * dt * (*last_rate_ + rate)))).normalized() : before});
   last_rate_ = rate;
 }
 
 void GyroTurns::forget_before(Time t) {
   while (turned_.size() > 2 && turned_[1].t < t) turned_.pop_front();
+  while (!gaps_.empty() && gaps_.front().to < t) gaps_.pop_front();
+}
+
+bool GyroTurns::covers(Time a, Time b) const {
+  if (empty() || a < first() || b > last()) return false;
+  return std::ranges::none_of(gaps_, [&](const Gap& gap) { return gap.from < b && a < gap.to; });
 }
 
 /// Between two readings by their mean: at a degree apart it differs from the great circle by less than 1e-6 rad.
@@ -47,6 +54,11 @@ Quat GyroTurns::orientation(Time t) const {
   return Quat((1 - x) * before->q.coeffs() + x * after->q.coeffs()).normalized();
 }
 
-Vec3 GyroTurns::rate(Time t) const { return so3_log(between(t - kRateOver, t + kRateOver)) / (2 * kRateOver.seconds()); }
+TurnAround GyroTurns::around(Time t, Duration side) const {
+  side = std::clamp(side, kLeastSide, kMostSide);
+  const double s = side.seconds();
+  const Vec3 before = so3_log(between(t - side, t)), after = so3_log(between(t, t + side));
+  return {(before + after) / (2 * s), (after - before) / (s * s)};
+}
 
 }  // namespace fbvins

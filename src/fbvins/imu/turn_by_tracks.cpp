@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -16,6 +15,8 @@ constexpr double kHuber_sigmas = 2;
 /// What is assumed of parallax: that of each track differs from the mean by so many times the mean, which is more than in any room, so that
 /// the mean counts only where parallax is small; none is larger than the second, rad.
 constexpr double kDepths = 3, kMostParallax = 0.5;
+/// Rows that are taken later have another parallax where the camera accelerates: by 3 m/s^2 at 3 m, standard deviation, 1/s^2.
+constexpr double kParallaxGain = 1;
 /// Rounds of reweighting, from nothing and from a parallax that was found before, and what ends them.
 constexpr int kRounds = 4, kRoundsNear = 2;
 constexpr double kSame_rad = 2e-5;
@@ -24,24 +25,26 @@ constexpr double kSame_rad = 2e-5;
 struct Sight {
   Vec3 expected, off;  ///< without parallax, and what was seen beside it
   Vec3 by_line;        ///< of `off`, by the line delay
+  double late_s;       ///< its rows in the mean, after the middle row
   Vec3 normal;         ///< of the plane of both directions
   double variance;
 };
 
-/// `v`, so many seconds after the middle row, in the axes of the middle row.
+/// `v`, seen when the camera was turned by so much since the middle row, in the axes of the middle row.
 Vec3 at_middle_row(const Vec3& v, const Vec3& angle) {
   const Vec3 turned = angle.cross(v);
   return v + turned + 0.5 * angle.cross(turned);
 }
 
 Sight sight_of(const SeenTwice& track, const PredictedTurnOfPair& turn) {
-  const Vec3 a = at_middle_row(track.a, turn.line_delay_s * track.rows_a * turn.rate_a);
-  const Vec3 b = at_middle_row(track.b, turn.line_delay_s * track.rows_b * turn.rate_b);
+  const Vec3 a = at_middle_row(track.a, turn.around_a.after(turn.line_delay_s * track.rows_a));
+  const Vec3 b = at_middle_row(track.b, turn.around_b.after(turn.line_delay_s * track.rows_b));
   Sight s;
   s.expected = turn.R.transpose() * a;
   const auto across = [&](const Vec3& v) { return Vec3(v - s.expected * s.expected.dot(v)); };
   s.off = across(b);
-  s.by_line = across(track.rows_b * turn.rate_b.cross(b) - turn.R.transpose() * (track.rows_a * turn.rate_a.cross(a)));
+  s.by_line = across(track.rows_b * turn.around_b.rate.cross(b) - turn.R.transpose() * (track.rows_a * turn.around_a.rate.cross(a)));
+  s.late_s = 0.5 * turn.line_delay_s * (track.rows_a + track.rows_b);
   s.normal = s.expected.cross(b);
   s.variance = track.sigma * track.sigma;
   return s;
@@ -131,9 +134,11 @@ TurnError turn_error(const std::vector<SeenTwice>& tracks, const PredictedTurnOf
   for (const SeenTwice& track : tracks) sights.push_back(sight_of(track, turn));
   TurnError out;
   out.parallax = near ? fit_parallax(sights, *near, kRoundsNear) : best_parallax(sights);
-  Mat3 V = 1 / (kMostParallax * kMostParallax) * Mat3::Identity();
-  Vec3 v = Vec3::Zero();
-  Eigen::Matrix<double, 4, 3> X = Eigen::Matrix<double, 4, 3>::Zero();
+  // Eliminated are the parallax, and by how much that of later rows is another.
+  Mat6 V = Mat6::Zero();
+  V.diagonal() << Vec3::Constant(1 / std::pow(kMostParallax, 2)), Vec3::Constant(1 / std::pow(kParallaxGain * turn.dt_s, 2));
+  Vec6 v = Vec6::Zero();
+  Eigen::Matrix<double, 4, 6> X = Eigen::Matrix<double, 4, 6>::Zero();
   out.rows = -3;
   for (const Sight& s : sights) {
     const Weighted w = weighted(s, out.parallax);
@@ -146,17 +151,21 @@ TurnError turn_error(const std::vector<SeenTwice>& tracks, const PredictedTurnOf
     out.A(3, 3) += s.by_line.dot(by_line);
     out.a.head<3>() += by_turn.transpose() * off;
     out.a(3) += s.by_line.dot(off);
-    X.topRows<3>() += by_turn.transpose() * W_across;
-    X.row(3) += by_line.transpose();
-    V += W_across, v += off;
+    Eigen::Matrix<double, 4, 3> by_parallax;
+    by_parallax << by_turn.transpose() * W_across, by_line.transpose();
+    X.leftCols<3>() += by_parallax, X.rightCols<3>() += s.late_s * by_parallax;
+    V.topLeftCorner<3, 3>() += W_across, V.topRightCorner<3, 3>() += s.late_s * W_across;
+    V.bottomRightCorner<3, 3>() += s.late_s * s.late_s * W_across;
+    v.head<3>() += off, v.tail<3>() += s.late_s * off;
     out.cost += s.off.dot(off);
     out.rows += s.variance * (2 * w.information - w.information * w.along * w.shift.squaredNorm());
   }
   out.A.bottomLeftCorner<1, 3>() = out.A.topRightCorner<3, 1>().transpose();
-  const Eigen::Matrix<double, 4, 3> gain = X * V.inverse();
-  out.A -= gain * X.transpose();
-  out.a -= gain * v;
-  out.cost -= v.dot(V.inverse() * v);
+  V.bottomLeftCorner<3, 3>() = V.topRightCorner<3, 3>().transpose();
+  const Eigen::LDLT<Mat6> ldlt(V);
+  out.A -= X * ldlt.solve(X.transpose());
+  out.a -= X * ldlt.solve(v);
+  out.cost -= v.dot(ldlt.solve(v));
   return out;
 }
 

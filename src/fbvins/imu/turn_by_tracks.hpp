@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fbvins/geometry/so3.hpp"
+#include "fbvins/imu/gyro_turns.hpp"
 
 namespace fbvins {
 
@@ -22,8 +23,9 @@ struct SeenTwice {
 /// From the middle row of one image to that of the other, and how each image's rows turn beside it.
 struct PredictedTurnOfPair {
   Mat3 R;
-  Vec3 rate_a, rate_b;
+  TurnAround around_a, around_b;
   double line_delay_s;
+  double dt_s;
 };
 
 /// The cost of an error e = (turn, line delay) is cost + 2 a e + e A e, the parallax that the tracks have in common eliminated.

@@ -16,7 +16,11 @@ constexpr double kSigma = 1e-3, kLineDelay_s = 50e-6;
 
 /// Tracks of two images; `moved`: the camera, in the axes of the second.
 struct Scene {
-  PredictedTurnOfPair truth{so3_exp(Vec3(0.05, -0.08, 0.03)).toRotationMatrix(), Vec3(0.5, -1, 0.2), Vec3(0.8, -0.6, 0.4), kLineDelay_s};
+  PredictedTurnOfPair truth{so3_exp(Vec3(0.05, -0.08, 0.03)).toRotationMatrix(),
+                            {Vec3(0.5, -1, 0.2), Vec3(5, 20, -10)},
+                            {Vec3(0.8, -0.6, 0.4), Vec3(-10, 15, 5)},
+                            kLineDelay_s,
+                            0.1};
   std::vector<SeenTwice> tracks;
 
   explicit Scene(const Vec3& moved) {
@@ -26,12 +30,12 @@ struct Scene {
       const Vec3 noise(rng.normal(), rng.normal(), rng.normal());
       const Vec3 b = (truth.R.transpose() * a - moved / rng.uniform(2, 6) + kSigma * noise).normalized();
       const double rows_a = 450 * a.y() / a.z(), rows_b = 450 * b.y() / b.z();
-      tracks.push_back({so3_exp(Vec3(-kLineDelay_s * rows_a * truth.rate_a)) * a, so3_exp(Vec3(-kLineDelay_s * rows_b * truth.rate_b)) * b,
+      tracks.push_back({so3_exp(-truth.around_a.after(kLineDelay_s * rows_a)) * a, so3_exp(-truth.around_b.after(kLineDelay_s * rows_b)) * b,
                         kSigma, rows_a, rows_b});
     }
   }
   PredictedTurnOfPair off_by(const Vec3& turn, double line_delay_s) const {
-    return {truth.R * so3_exp(turn).toRotationMatrix(), truth.rate_a, truth.rate_b, truth.line_delay_s + line_delay_s};
+    return {truth.R * so3_exp(turn).toRotationMatrix(), truth.around_a, truth.around_b, truth.line_delay_s + line_delay_s, truth.dt_s};
   }
 };
 
