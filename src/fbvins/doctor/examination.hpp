@@ -2,6 +2,7 @@
 // Private to the doctor: one examination, step by step. What a step finds wrong is corrected for the steps after it.
 //   examination.cpp          order, readings by themselves, images by themselves
 //   examination_imu.cpp      the gyroscope against what the images show
+//   examination_gyro.cpp     time offset, line delay and mounting of one camera, by the solver that flies; offsets that drift
 //   examination_accel.cpp    the accelerometer against what the images show
 //   examination_force.cpp    the same by the tracks of one camera, without depths
 //   examination_cameras.cpp  lenses and the pair of cameras
@@ -9,6 +10,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,6 +30,14 @@ namespace doctor {
 inline constexpr double kUnitTolerance = 0.15;
 /// Standard deviations from which a difference of practical size is a finding.
 inline constexpr double kSignificant = 5;
+/// Smaller errors of time offset and mounting are not spoken of.
+inline constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175;
+/// Least rotation about the second principal axis from which axes can be identified, rad in a tenth of a second.
+inline constexpr double kLeastSecondAxis_rad = 2.5e-3;
+inline bool certainly(double wrong, double sigma, double practical) {
+  return std::abs(wrong) > practical && std::abs(wrong) > kSignificant * sigma;
+}
+inline double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 }  // namespace doctor
 
 class Examination {
@@ -71,6 +81,7 @@ class Examination {
   void time_offset(const MotionFit& fit);
   void rotation(const MotionFit& fit);
   void lens(FindingKind kind, WhichLens which, const Eigen::VectorXd& amount, const Eigen::VectorXd& sigma, double explained_px);
+  MotionFit fit_with_gyro() const;
   MotionFit with_common_focal(MotionFit fit);
   void use_common_focal(double log_focal, double sigma, double explained_px, const StereoFit& pair);
   StereoFit pair_fit(StereoRig rig, bool focal_known);

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -18,26 +19,20 @@
 namespace fbvins {
 namespace {
 
-using doctor::kSignificant;
+using doctor::angle_of, doctor::certainly, doctor::kLeastSecondAxis_rad, doctor::kRotationPractical_rad, doctor::kSignificant,
+    doctor::kTimePractical_s;
 using doctor::kUnitTolerance;
 
 /// Below this correlation the readings do not agree with the images for any axes, unit and time offset.
 constexpr double kAgreement = 0.7;
-/// Least rotation about the second principal axis from which axes can be identified, rad in a tenth of a second.
-constexpr double kLeastSecondAxis_rad = 2.5e-3;
 /// A smaller factor is a wrong range or a wrong lens, not a wrong unit.
 constexpr double kMostScale = 1.7;
 /// Share of saturated readings beyond which the rest says little about scale and axes.
 constexpr double kMostCutOff = 0.2;
-/// Of a third of the recording, so that its time offset is judged by itself.
-constexpr double kAgreementOfPart = 0.95;
-constexpr std::size_t kFewestPairsOfPart = 20;
-constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kGyroBiasPractical_radps = 0.1;
+constexpr double kGyroBiasPractical_radps = 0.1;
 
 /// A change of one camera's lens must leave less than this share of the error.
 constexpr double kLensLeaves = 0.9;
-
-double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 
 /// Mean specific force over a quarter of a second around t.
 Vec3 mean_force(const ImuSeries& imu, Time t) {
@@ -170,7 +165,7 @@ void Examination::motion() {
   // From the rotations where that predicts features better than what was given: a rig that hardly turns tells little of time.
   if (prediction_error_px(pairs_, imu_, {rig_, rig_.time_offset_s}) <= prediction_error_px(pairs_, imu_, {rig_, offset_s_}))
     offset_s_ = rig_.time_offset_s;
-  const MotionFit fit = with_common_focal(fit_motion(pairs_, imu_, {rig_, offset_s_, false}));
+  const MotionFit fit = with_common_focal(fit_with_gyro());
   if (!fit.usable) {
     not_judged("rotation and time between camera and IMU: too few images with readings around them");
     return;
@@ -252,39 +247,9 @@ void Examination::gyro_bias(const MotionFit& fit) {
   finding.advice = "let the driver measure it at rest and subtract it, or subtract this from the readings";
 }
 
-/// The time offset in the first third of the recording against that in the last one.
-bool Examination::drift(const MotionFit& fit) {
-  StereoRig rig = rig_;
-  rig.T_BC0 = {Mat3(fit.R_CB.transpose()), rig.T_BC0.p};
-  const auto part = [&](std::size_t begin, std::size_t end) -> std::optional<MotionFit> {
-    const std::vector<FramePair> pairs(pairs_.begin() + static_cast<std::ptrdiff_t>(begin),
-                                       pairs_.begin() + static_cast<std::ptrdiff_t>(end));
-    const TurnFit turns = fit_turns(pairs, imu_, rig);
-    if (!turns.seen || turns.correlation < kAgreementOfPart || turns.spread.y() < kLeastSecondAxis_rad) return std::nullopt;
-    MotionFit out = fit_motion(pairs, imu_, {rig, turns.offset_s, false});
-    return out.usable ? std::optional(std::move(out)) : std::nullopt;
-  };
-  const std::size_t third = pairs_.size() / 3;
-  if (third < kFewestPairsOfPart) return false;
-  const std::optional<MotionFit> first = part(0, third), last = part(pairs_.size() - third, pairs_.size());
-  if (!first || !last) return false;
-  const double drift_s = last->offset_s - first->offset_s, sigma_s = std::hypot(first->offset_sigma_s, last->offset_sigma_s);
-  measured(fmt::format("time offset in the first third of the recording {:.2f} +- {:.2f} ms, in the last one {:.2f} +- {:.2f}",
-                       1e3 * first->offset_s, 1e3 * first->offset_sigma_s, 1e3 * last->offset_s, 1e3 * last->offset_sigma_s));
-  if (std::abs(drift_s) < kTimePractical_s || std::abs(drift_s) < kSignificant * sigma_s) return false;
-  Finding& finding = found(FindingKind::clocks_drift, 1e3 * drift_s, 1e3 * sigma_s, "ms");
-  finding.measured = fmt::format(
-      "the IMU's stamps are {:.1f} ms late against the images' in the first third of the recording and {:.1f} ms in the last one (+- {:.1f})",
-      1e3 * first->offset_s, 1e3 * last->offset_s, finding.sigma);
-  finding.expected = "the same throughout";
-  finding.advice =
-      "readings or images are lost where stamps are counted up instead of measured, or two clocks run at different speeds: stamp both by one clock";
-  return true;
-}
-
 void Examination::time_offset(const MotionFit& fit) {
   const double wrong_s = fit.offset_s - evidence_.rig.time_offset_s;
-  if (std::abs(wrong_s) < kTimePractical_s || std::abs(wrong_s) < kSignificant * fit.offset_sigma_s) return;
+  if (!certainly(wrong_s, fit.offset_sigma_s, kTimePractical_s)) return;
   Finding& finding = found(FindingKind::time_offset, 1e3 * wrong_s, 1e3 * fit.offset_sigma_s, "ms");
   finding.measured = fmt::format(
       "t_imu = t_image {:+.2f} +- {:.2f} ms at one instant: the IMU's stamps are {:.2f} ms {} than the calibration says",
@@ -310,7 +275,7 @@ void Examination::time_offset(const MotionFit& fit) {
 void Examination::rotation(const MotionFit& fit) {
   const Mat3 wrong = evidence_.rig.T_BC0.R() * fit.R_CB;
   const double sigma = fit.rotation_sigma_rad.maxCoeff(), angle = angle_of(wrong);
-  if (angle < kRotationPractical_rad || angle < kSignificant * sigma) return;
+  if (!certainly(angle, sigma, kRotationPractical_rad)) return;
   const auto T_C0C1 = rig_.T_BC0.inverse() * rig_.T_BC1;
   rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
   rig_.T_BC1 = rig_.T_BC0 * T_C0C1;

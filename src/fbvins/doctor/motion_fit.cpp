@@ -46,6 +46,10 @@ const std::vector<ChangeGroup>& groups_without_scale() {
   }();
   return all;
 }
+/// What fit_gyro says.
+bool of_gyro_fit(FindingKind kind) {
+  return kind == FindingKind::time_offset || kind == FindingKind::rolling_shutter || kind == FindingKind::imu_camera_rotation;
+}
 constexpr double kSignificant = 5;
 constexpr int kRounds = 5;
 constexpr std::size_t kFewestPairs = 30;
@@ -60,15 +64,16 @@ struct FoundChange {
 };
 
 /// Estimates the group of unknowns that reduces the error most, then the next, as long as the reduction is significant.
-std::vector<FoundChange> search(MotionProblem& problem, bool focal_doubted) {
+std::vector<FoundChange> search(MotionProblem& problem, const MotionStart& start) {
   std::vector<FoundChange> found;
   double capped = problem.capped_error();
   for (int round = 0; round < kRounds; ++round) {
-    auto best = best_candidate(problem, focal_doubted ? groups_without_scale() : groups());
+    auto best = best_candidate(problem, start.focal_doubted ? groups_without_scale() : groups());
     if (!best || !(best->error_px < capped)) break;
     const Amount amount = amount_of(*best->group, best->fit, best->solution);
     if (amount.sigmas() <= kSignificant) break;
-    if (amount.value.norm() > best->group->practical) found.push_back({best->group, explained_px(capped, best->error_px)});
+    const bool said = !start.gyro_known || !of_gyro_fit(best->group->kind);
+    if (said && amount.value.norm() > best->group->practical) found.push_back({best->group, explained_px(capped, best->error_px)});
     capped = best->error_px;
     problem = std::move(best->fit);
   }
@@ -92,7 +97,7 @@ MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, 
   if (!problem.converge()) return fit;
   fit.usable = true;
   fit.error_px = problem.typical_error();
-  const std::vector<FoundChange> found = search(problem, start.focal_doubted);
+  const std::vector<FoundChange> found = search(problem, start);
   problem.free = with(with(kAlwaysSaid, kAlwaysFree), problem.free);
   if (start.focal_doubted) problem.free = with(problem.free, kFocalAlone);
   const auto last = problem.converge();

@@ -20,6 +20,7 @@ struct MotionStart {
   StereoRig rig;               ///< T_BC0 and left lens as far as known
   double offset_s = 0;         ///< t_imu = t_image + offset, as far as known
   bool focal_doubted = false;  ///< estimate it even where it explains little, and take the gyroscope's scale as right
+  bool gyro_known = false;     ///< offset, line delay and rotation are (fit_gyro): what else is said of them is no change
 };
 
 struct MotionChange {
