@@ -51,6 +51,40 @@ TEST(Initialiser, StartsInMotion) {
   EXPECT_LT((last.bias.gyro_radps - flight.bias.gyro_radps).norm(), 0.02);
 }
 
+TEST(SpacedFrames, HoldTheNewestWithTheReadingsBetweenThem) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 53);  // 20 images a second
+  SpacedFrames frames;
+  for (int k = 0; k < 40; ++k) {
+    EXPECT_EQ(frames.full(), k >= 18) << k;  // nine that are 0.1 s apart, and the newest
+    frames.add(flight.frame(k), 0.12);
+  }
+  EXPECT_EQ(frames.all().back().id, FrameId{39});
+  for (std::size_t i = 1; i < frames.all().size(); ++i) {
+    const TrackedFrame &before = frames.all()[i - 1], &frame = frames.all()[i];
+    EXPECT_EQ(frame.imu.samples.front().t, before.t);
+    EXPECT_EQ(frame.imu.samples.back().t, frame.t);
+    if (i + 1 < frames.all().size()) EXPECT_NEAR((frame.t - before.t).seconds(), 0.1, 1e-6);
+  }
+}
+
+// A second of strong motion is enough for one camera, of a gentle one two are needed.
+TEST(Initialiser, OneCameraStartsSoonInStrongMotion) {
+  for (const bool strong : {true, false}) {
+    SimulatedFlight flight(strong ? Motion(1.5, 1.5) : Motion(0.05, 0.05), 54);
+    Initialiser initialiser({}, flight.rig.imu_noise, {}, true);
+    const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+    int first = -1;
+    for (int k = 0; k < 40 && first < 0; ++k)
+      if (initialiser.process(flight.frame(k), {}, calibration, {})) first = k;
+    if (strong) {
+      EXPECT_GE(first, 9);
+      EXPECT_LT(first, 20);
+    } else {
+      EXPECT_GE(first, 33);
+    }
+  }
+}
+
 TEST(Initialiser, StartsFromRest) {
   SimulatedFlight flight(Motion(0, 0), 52);
   const Started s = start(flight, 40, {}, 0.05);
