@@ -17,9 +17,8 @@ namespace fbvins {
 using Quad = std::array<Vec2, 4>;
 
 struct DarkSquareOptions {
-  int reach_px = 12;  ///< black and white are those of so many pixels around
-  int smaller_px =
-      0;  ///< black parts are looked at smaller by so many pixels on each side, 0 or 1: what hangs together comes apart
+  int reach_px = 12;   ///< black and white are those of so many pixels around
+  int smaller_px = 0;  ///< black parts are looked at smaller by this on each side, 0 or 1: what hangs together comes apart
 };
 
 /// Corners to one or two pixels. Those that reach the image's border are left out, and so are those below 8 px.

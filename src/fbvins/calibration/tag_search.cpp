@@ -10,23 +10,21 @@ namespace {
 
 constexpr double kRadiusPart = 0.125;  ///< of the edge: the border's inner edge, or the next tag, is not nearer
 constexpr double kLeastSearchRadius_px = 2, kLargestSearchRadius_px = 6;
-constexpr int kLeastCrossings = 0;  ///< of the four corners
 constexpr double kSmallestQuad_px = 10;
 constexpr int kNear_px = 12, kFarPart = 16;  ///< black and white: of what is near, or of this part of the image's width
 
-/// The corners where edges cross, if enough are crossings.
+/// Moves the corners to where edges cross; false for a square that is too small.
 bool refine_quad(const ImageView& image, Quad& quad) {
   double side_px = 1e9;
   for (std::size_t k = 0; k < 4; ++k) side_px = std::min(side_px, (quad[k] - quad[(k + 1) % 4]).norm());
   if (!(side_px > kSmallestQuad_px)) return false;
   const double radius_px = std::clamp(kRadiusPart * side_px, kLeastSearchRadius_px, kLargestSearchRadius_px);
   const Quad given = quad;
-  int crossings = 0;
   for (std::size_t k = 0; k < 4; ++k)
     if (const auto corner =
             refine_corner(image, given[k], given[(k + 1) % 4] - given[k], given[(k + 3) % 4] - given[k], radius_px))
-      quad[k] = *corner, ++crossings;
-  return crossings >= kLeastCrossings;
+      quad[k] = *corner;
+  return true;
 }
 
 bool is_covered(const std::vector<TagDetection>& found, const Quad& quad) {
