@@ -139,8 +139,8 @@ int show_bag(const Arguments& arguments, const BagSurvey& bag, const Error& why)
   for (const std::string& warning : bag.warnings) warn(warning);
   if (arguments.json) fmt::print("{}\n", describe(bag).dump(2));
   else print_text(arguments.recording.path, bag);
-  if (calibration_given(arguments) || (!arguments.recording.topics.empty() && !bag.question.empty())) return fail(why.message);
-  if (bag.question.empty() && bag.no_calibration.empty()) return fail(why.message);
+  const bool answered = bag.question.empty() ? calibration_given(arguments) : !arguments.recording.topics.empty();
+  if (answered || (bag.question.empty() && bag.no_calibration.empty())) return fail(why.message);
   if (!bag.unreadable.empty()) return fail(fmt::format("{}: {}", arguments.recording.path, bag.unreadable));
   warn(why.message);
   return kOk;
