@@ -25,7 +25,7 @@ constexpr double kSame_rad = 2e-5;
 struct Sight {
   Vec3 expected, off;  ///< without parallax, and what was seen beside it
   Vec3 by_line;        ///< of `off`, by the line delay
-  double late_s;       ///< its rows in the mean, after the middle row
+  double late_s;       ///< mean time of its rows after that of the middle row
   Vec3 normal;         ///< of the plane of both directions
   double variance;
 };
