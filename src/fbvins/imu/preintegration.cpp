@@ -73,10 +73,27 @@ void Preintegration::integrate(const ImuSegment& segment) {
   }
 }
 
+void Preintegration::loosen_end(double sigma_s, const Vec3& velocity_B, const Vec3& gravity_B) {
+  if (empty()) return;
+  end_p_ = sigma_s * velocity_B;
+  end_theta_ = sigma_s * (readings_.back().gyro_radps - bias_.gyro_radps);
+  end_v_ = sigma_s * (readings_.back().accel_mps2 - bias_.accel_mps2 + gravity_B);
+  sqrt_information_valid_ = false;
+}
+
+Mat15 Preintegration::covariance() const {
+  Eigen::Matrix<double, 9, 1> end;
+  end << deltas_.q * end_p_, end_theta_, deltas_.q * end_v_;
+  Mat15 P = covariance_;
+  P.topLeftCorner<9, 9>() += end * end.transpose();
+  return P;
+}
+
 void Preintegration::append(const Preintegration& later) {
   if (later.empty()) return;
   assert((readings_.empty() || readings_.back().t == later.readings_.front().t) && "intervals must be consecutive");
   for (std::size_t k = readings_.empty() ? 0 : 1; k < later.readings_.size(); ++k) push(later.readings_[k]);
+  end_p_ = later.end_p_, end_theta_ = later.end_theta_, end_v_ = later.end_v_;
 }
 
 void Preintegration::repropagate(const ImuBias& linearisation_bias) {
@@ -163,7 +180,7 @@ const Mat15& Preintegration::sqrt_information() const {
     sqrt_information_.setZero();
     if (!empty()) {
       // Cholesky from the last row upwards gives covariance = V V^T with V upper; U = V^-1 (eq. P15).
-      const Mat15 reversed = covariance_.reverse();
+      const Mat15 reversed = covariance().reverse();
       const Mat15 L = reversed.llt().matrixL();
       const Mat15 V = L.reverse();
       sqrt_information_ = V.triangularView<Eigen::Upper>().solve(Mat15::Identity());
@@ -189,7 +206,7 @@ Mat15 Preintegration::predict_covariance(const Quat& q_FB, const ImuBias& bias, 
   F.block<3, 3>(nav::v, nav::ba) = R_i * J_v_ba_;
   Mat15 G = Mat15::Identity();  // the deltas' p and v are in B_i
   G.block<3, 3>(nav::p, nav::p) = G.block<3, 3>(nav::v, nav::v) = R_i;
-  return F * P_i * F.transpose() + G * covariance_ * G.transpose();
+  return F * P_i * F.transpose() + G * covariance() * G.transpose();
 }
 
 }  // namespace fbvins

@@ -47,7 +47,14 @@ class Preintegration {
   /// adds nothing; over a gap (ImuGapModel) the signal is taken as linear and the covariance inflated.
   void integrate(const ImuSegment& segment);
 
-  /// Joins the consecutive interval `later`, integrating its raw readings with this one's bias.
+  /// The interval may end earlier or later, by this standard deviation in seconds: the stamp of an image there has noise (eq. P11a).
+  /// `j`: the state at its end, with the gravity of its frame.
+  template <class F>
+  void loosen_end(double sigma_s, const NavState<F>& j, const Vec3& gravity_F) {
+    loosen_end(sigma_s, j.v_B(), j.T_FB.q.conjugate() * gravity_F);
+  }
+
+  /// Joins the consecutive interval `later`, integrating its raw readings with this one's bias. The end is that of `later`.
   void append(const Preintegration& later);
 
   /// Integrates all readings again about another bias.
@@ -79,7 +86,9 @@ class Preintegration {
   const Mat3& J_p_ba() const { return J_p_ba_; }
 
   /// Of (p, theta, v, bg, ba), the last two being the random walk of the biases from i to j.
-  const Mat15& covariance() const { return covariance_; }
+  Mat15 covariance() const;
+  /// Without the end's: over several intervals in a row the noise of stamps cancels, that of readings adds up.
+  const Mat15& covariance_of_readings() const { return covariance_; }
   /// Upper-triangular U with U^T U = covariance^-1. Zero while empty().
   const Mat15& sqrt_information() const;
 
@@ -107,6 +116,7 @@ class Preintegration {
     ImuNoiseScale noise;
   };
 
+  void loosen_end(double sigma_s, const Vec3& velocity_B, const Vec3& gravity_B);
   void reset(const ImuBias& bias);
   void push(const Reading& reading);
   void step(const Reading& from, const Reading& to);
@@ -117,7 +127,8 @@ class Preintegration {
   std::vector<Reading> readings_;
   ImuDeltas deltas_;
   Mat3 J_theta_bg_, J_v_bg_, J_v_ba_, J_p_bg_, J_p_ba_;
-  Mat15 covariance_;
+  Mat15 covariance_;                ///< without the end's
+  Vec3 end_p_ = Vec3::Zero(), end_theta_ = Vec3::Zero(), end_v_ = Vec3::Zero();  ///< loosen_end()'s standard deviation, in B_j
   double longest_gap_s_ = 0;
   mutable Mat15 sqrt_information_;
   mutable bool sqrt_information_valid_ = false;

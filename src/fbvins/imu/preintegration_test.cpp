@@ -149,6 +149,44 @@ TEST(Preintegration, CovarianceMatchesMonteCarlo) {
   }
 }
 
+/// What the interval gains or loses where its end is another is what its covariance says.
+TEST(Preintegration, AnEndOfUncertainTimeMovesAsTheBodyDoes) {
+  const Motion motion;
+  const double later_s = 0.001;
+  const Vec3 gravity = level_gravity();
+  Preintegration p = integrated(motion.segment(kFrom, kTo, Duration{1'000'000}, kBias), kBias);
+  const Mat15 before = p.covariance();
+  p.loosen_end(later_s, motion.state(kTo.seconds(), kBias), gravity);
+  const Mat15 added = p.covariance() - before;
+  const auto at_end = motion.state(kTo.seconds(), kBias), after = motion.state(kTo.seconds() + later_s, kBias);
+  const Mat3 to_begin = motion.state(kFrom.seconds(), kBias).T_FB.q.conjugate().toRotationMatrix();
+  Eigen::Matrix<double, 9, 1> moved;
+  moved << to_begin * (after.T_FB.p - at_end.T_FB.p), so3_log(at_end.T_FB.q.conjugate() * after.T_FB.q),
+      to_begin * (after.v_FB - at_end.v_FB);
+  EXPECT_NEAR((added.topLeftCorner<9, 9>() - moved * moved.transpose()).norm(), 0, 0.01 * moved.squaredNorm());
+  EXPECT_EQ((added.rightCols<6>().norm()), 0);
+  p.repropagate(kBias);
+  EXPECT_NEAR((p.covariance() - before - added).norm(), 0, 1e-15);
+  const Mat15 U = p.sqrt_information();
+  EXPECT_NEAR((U * p.covariance() * U.transpose() - Mat15::Identity()).norm(), 0, 1e-6);
+}
+
+TEST(Preintegration, TheEndThatCountsIsThatOfTheLastIntervalJoined) {
+  const Motion motion;
+  const Time middle = kFrom + Duration{(kTo - kFrom).ns / 2};
+  Preintegration first = integrated(motion.segment(kFrom, middle, Duration{5'000'000}, kBias), kBias);
+  Preintegration second = integrated(motion.segment(middle, kTo, Duration{5'000'000}, kBias), kBias);
+  Preintegration exact = first, whole = first;
+  exact.append(second);
+  first.loosen_end(0.01, motion.state(middle.seconds(), kBias), level_gravity());
+  first.append(second);
+  EXPECT_EQ(first.covariance(), exact.covariance());
+  second.loosen_end(0.01, motion.state(kTo.seconds(), kBias), level_gravity());
+  whole.append(second);
+  exact.loosen_end(0.01, motion.state(kTo.seconds(), kBias), level_gravity());
+  EXPECT_NEAR((whole.covariance() - exact.covariance()).norm(), 0, 1e-12);
+}
+
 TEST(Preintegration, MissingReadingsInflateTheCovariance) {
   const Motion motion;
   ImuSegment whole = motion.segment(kFrom, kTo, Duration{5'000'000}), one_lost = whole, broken = whole;
