@@ -44,7 +44,8 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibration_(calibrated_),
       one_camera_(!has_stereo(rig)),
       uncertainty_(scale_sigma_of(rig), one_camera_, options.gravity_mps2),
-      time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset),
+      time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset,
+                      before ? before->time_offset : std::nullopt),
       exposures_(rig),
       surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
@@ -84,6 +85,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   odometry.id = frame.id;
   odometry.t = frame.t;
   odometry.time_offset_s = time_alignment_.correction().seconds();
+  odometry.time_offset_sigma_s = time_alignment_.sigma_s();
   if (running_) publish(odometry);
   odometry.reset_counter = reset_counter_;
   if (running_) carried_.remember(window_, odometry, reading_noise_.clipped());

@@ -21,13 +21,25 @@ constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma
 constexpr Duration kStep{4'000'000};
 /// Noise of stamps below this is not told from none where tracks are few, and harms less than readings that count for less.
 constexpr double kNoJitter_s = 0.0007;
+/// Drivers keep their delay from flight to flight to this, at best.
+constexpr double kKept_s = 0.005;
+
+/// Beyond the rig's. More than can be found is not believed.
+std::optional<TimeOffsetEstimate> correction_of(const std::optional<TimeOffsetEstimate>& kept, const StereoRig& rig) {
+  if (!kept) return kept;
+  const TimeOffsetEstimate beyond{kept->s - rig.time_offset_s, std::hypot(kept->sigma_s, kKept_s)};
+  if (std::abs(beyond.s) > GyroAlignment::kLargestOffset_s) return std::nullopt;
+  return beyond;
+}
 
 }  // namespace
 
-TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled)
+TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled, const std::optional<TimeOffsetEstimate>& kept)
     : enabled_(enabled),
       given_(Duration::from_seconds(rig.time_offset_s)),
-      alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {}) {}
+      alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {.known_offset = correction_of(kept, rig)}) {
+  if (const auto known = correction_of(kept, rig); known && enabled) correction_ = found_ = Duration::from_seconds(known->s);
+}
 
 bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   if (!enabled_) return false;
@@ -59,6 +71,12 @@ void TimeAlignment::solve(bool running) {
   const double line_sigmas = found_ == Duration{} ? kCertainLine_sigma : kDoubtedLine_sigma;
   if (found->pairs < kEnoughForStart || line_off_s < std::max(kLeastLine_s, line_sigmas * found->line_delay_sigma_s())) return;
   line_delay_s_ = found->line_delay_s();
+}
+
+/// An offset that is less than kLeast_s off is left as it is.
+double TimeAlignment::sigma_s() const {
+  if (sigma_s_ >= kUnknown_s) return 0;
+  return std::hypot(sigma_s_, kLeast_s / std::sqrt(3.0), (found_ - correction_).seconds());
 }
 
 double TimeAlignment::stamp_sigma_s() const {
