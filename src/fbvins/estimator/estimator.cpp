@@ -28,7 +28,8 @@ constexpr double kAtOnce = 2;
 constexpr double kAxes = 0.015;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.15;
-/// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
+/// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale. Images in between that
+/// agree take as much time away.
 constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
 constexpr std::ptrdiff_t kEnoughLandmarks = 25;
@@ -305,8 +306,10 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
 }
 
 bool Estimator::contradicted_too_long(Time t) {
-  if (!one_camera_ || !monitor_.follows_images()) agreed_ = t;
-  return (t - agreed_).seconds() > kContradictedOneCamera_s;
+  const double step_s = (t - std::exchange(judged_, t)).seconds();
+  if (!one_camera_ || !monitor_.follows_images()) contradicted_s_ = 0;
+  else contradicted_s_ = std::max(0.0, contradicted_s_ + (monitor_.contradicts_now() ? step_s : -step_s));
+  return contradicted_s_ > kContradictedOneCamera_s;
 }
 
 Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {

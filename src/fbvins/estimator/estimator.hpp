@@ -104,7 +104,8 @@ class Estimator {
   CarriedState carried_;
   std::uint8_t wrong_cameras_ = 0;    ///< in the newest frame; bits, as in Health
   int frames_with_readings_ = 0;      ///< in a row
-  Time agreed_;                       ///< last time without a contradiction, or with two cameras
+  Time judged_;                       ///< the newest frame that was
+  double contradicted_s_ = 0;         ///< one camera: by images that contradict the readings, less those that do not
   std::optional<Time> last_trouble_;  ///< of a pose that was not good
   SlidingWindow window_;
   WindowSolver solver_;
