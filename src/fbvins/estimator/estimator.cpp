@@ -28,6 +28,10 @@ constexpr double kAtOnce = 2;
 constexpr double kAxes = 0.015;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.15;
+/// Likewise: 5 % of right ones are refused, and tried again with the next image (chi-square, three numbers).
+constexpr double kMaxBiasSigmasAtStart = 2.8;
+/// For so long: axes and scale of a gyroscope that nobody has calibrated look like a bias that changes.
+constexpr double kBiasRefused_s = 1;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale. Images in between that
 /// agree take as much time away.
 constexpr double kContradictedOneCamera_s = 2;
@@ -124,12 +128,18 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   refuse_start(out.odometry);
 }
 
-/// One pair of several is enough. With one camera its scale has to be known, too.
-bool Estimator::start_is_good(const TrackedFrame& frame, const Odometry& solved) const {
+/// One pair of several is enough. With one camera its scale has to be known, too, and the gyroscope's bias be one that the tracks
+/// show without a start.
+bool Estimator::start_is_good(const TrackedFrame& frame, const Odometry& solved) {
   const bool a_pair_sees = solved.health.reason == HealthReason::one_camera && frame.stats.stereo > 0;
   if (solved.health.state != HealthState::good && !a_pair_sees) return false;
   const Vec3 v_WB = window_.tilt().levelled(window_.newest().state).v_FB;
-  return !one_camera_ || scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart;
+  if (!one_camera_) return true;
+  if (!(scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart)) return false;
+  const Vec3& gyro_bias_radps = window_.newest().state.bias.gyro_radps;
+  if (time_alignment_.off_sigmas(gyro_bias_radps, solved.gyro_bias_covariance) < kMaxBiasSigmasAtStart) return true;
+  if (!bias_refused_) bias_refused_ = frame.t;
+  return (frame.t - *bias_refused_).seconds() > kBiasRefused_s;
 }
 
 /// Nothing of it is published.
@@ -345,6 +355,7 @@ void Estimator::restart() {
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();
   running_ = false;
   calibration_ = calibrated_;
+  bias_refused_.reset();
   failed_solves_ = 0;
   ++reset_counter_;
   window_.clear();

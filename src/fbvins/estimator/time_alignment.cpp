@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/time_alignment.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -21,6 +22,9 @@ constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma
 constexpr Duration kStep{4'000'000};
 /// Noise of stamps below this is not told from none where tracks are few, and harms less than readings that count for less.
 constexpr double kNoJitter_s = 0.0007;
+/// The gyroscope's bias is taken from tracks that fit turns to this many of their standard deviations. Where things are close and
+/// the camera moves, its standard deviation is too small by up to the second (docs/experiments/sensors.md).
+constexpr double kFitsTurns_rms = 1, kBiasShared = 2;
 /// Drivers keep their delay from flight to flight to this, at best.
 constexpr double kKept_s = 0.005;
 
@@ -60,6 +64,7 @@ void TimeAlignment::solve(bool running) {
   const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
   if (!found || found->pairs < kFewestForStart) return;
   sigma_s_ = found->time_offset_sigma_s();
+  fits_turns_ = found->pairs >= kEnoughForStart && found->rms < kFitsTurns_rms ? found : std::nullopt;
   solves_ = std::min(solves_ + 1, kSolvesOfNoise);
   jitter_s_ += (found->stamp_sigma_s - jitter_s_) / solves_;
   const double off_s = std::abs(found->time_offset_s() - found_.seconds());
@@ -77,6 +82,13 @@ void TimeAlignment::solve(bool running) {
 double TimeAlignment::sigma_s() const {
   if (sigma_s_ >= kUnknown_s) return 0;
   return std::hypot(sigma_s_, kLeast_s / std::sqrt(3.0), (found_ - correction_).seconds());
+}
+
+double TimeAlignment::off_sigmas(const Vec3& gyro_bias_radps, const Mat3& covariance) const {
+  if (!fits_turns_) return 0;
+  const Vec3 off = gyro_bias_radps - fits_turns_->gyro_bias_radps();
+  const Mat3 of_both = kBiasShared * kBiasShared * fits_turns_->covariance.topLeftCorner<3, 3>() + covariance;
+  return std::sqrt(std::max(0.0, off.dot(of_both.ldlt().solve(off))));
 }
 
 double TimeAlignment::stamp_sigma_s() const {

@@ -38,6 +38,8 @@ class TimeAlignment {
   bool settling() const { return changed_ && (now_ - *changed_).seconds() < kForgotten_s; }
   /// What the line delay of the rig's shutters is corrected by.
   double line_delay_correction_s() const { return line_delay_s_; }
+  /// How far a gyroscope's bias is from what tracks alone say of it, in standard deviations of both; 0 where they say nothing.
+  double off_sigmas(const Vec3& gyro_bias_radps, const Mat3& covariance) const;
   /// Standard deviation of when an image was taken: the noise of its stamp, and what the offset is known to be wrong by.
   double stamp_sigma_s() const;
 
@@ -58,7 +60,8 @@ class TimeAlignment {
   Duration correction_{}, found_{};
   double line_delay_s_ = 0, jitter_s_ = 0, sigma_s_ = kUnknown_s;
   int solves_ = 0, off_ = 0;  ///< and those in a row that found the offset off
-  std::optional<Time> changed_;  ///< the correction, last
+  std::optional<Time> changed_;                      ///< the correction, last
+  std::optional<GyroAlignmentEstimate> fits_turns_;  ///< the newest solution, where the tracks do
   Time now_;
   std::optional<Duration> cut_by_;
 };

@@ -54,5 +54,16 @@ TEST(TimeAlignment, ThatOfTheFlightBeforeIsAppliedAtOnceAndCorrectedWhereItIsNot
   EXPECT_EQ(off.correction(), Duration{});
 }
 
+TEST(TimeAlignment, ABiasThatTheTracksDoNotShowIsManyStandardDeviationsOff) {
+  const Mat3 of_start = 0.003 * 0.003 * Mat3::Identity();
+  TimeAlignment alignment(StereoRig{}, true, {});
+  EXPECT_EQ(alignment.off_sigmas(Vec3(9, 9, 9), of_start), 0) << "nothing was seen yet";
+  Hand hand;
+  hand.middle_px = 0;
+  for (const TrackedFrame& frame : hand.frames(3)) alignment.add(frame, false);
+  EXPECT_LT(alignment.off_sigmas(kBias, of_start), 2);
+  EXPECT_GT(alignment.off_sigmas(kBias + Vec3(0.04, 0, 0), of_start), 4);
+}
+
 }  // namespace time_alignment_test
 }  // namespace fbvins
