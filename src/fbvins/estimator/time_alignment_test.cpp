@@ -62,7 +62,7 @@ TEST(TimeAlignment, ABiasThatTheTracksDoNotShowIsManyStandardDeviationsOff) {
   hand.middle_px = 0;
   for (const TrackedFrame& frame : hand.frames(3)) alignment.add(frame, false);
   EXPECT_LT(alignment.off_sigmas(kBias, of_start), 2);
-  EXPECT_GT(alignment.off_sigmas(kBias + Vec3(0.04, 0, 0), of_start), 4);
+  EXPECT_GT(alignment.off_sigmas(kBias + Vec3(0.1, 0, 0), of_start), 4);
 }
 
 }  // namespace time_alignment_test
