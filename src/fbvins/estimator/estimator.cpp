@@ -10,6 +10,7 @@
 #include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/estimator/mono_start.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/types/protection.hpp"
@@ -17,13 +18,9 @@
 namespace fbvins {
 namespace {
 
+using namespace thresholds;
+
 constexpr double kRestForStandstill_s = 0.5;
-/// Images with readings after a gap, until velocity and attitude are known again.
-constexpr int kFramesAfterGap = 6;
-/// A large correction so soon after a pose that was not good has to be confirmed by gravity.
-constexpr double kTrouble_s = 2;
-/// Otherwise so many times what a good pose may owe is made up for at once.
-constexpr double kAtOnce = 2;
 /// Share by which an accelerometer's axes and scale are off, of a sensor that was not calibrated up to twice as much.
 constexpr double kAxes = 0.015;
 /// Of a start with one camera.
@@ -32,9 +29,6 @@ constexpr double kMaxScaleSigmaAtStart = 0.15;
 constexpr double kMaxBiasSigmasAtStart = 2.8;
 /// For so long: axes and scale of a gyroscope that nobody has calibrated look like a bias that changes.
 constexpr double kBiasRefused_s = 1;
-/// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale. Images in between that
-/// agree take as much time away.
-constexpr double kContradictedOneCamera_s = 2;
 /// With fewer landmarks surfaces are compared as well.
 constexpr std::ptrdiff_t kEnoughLandmarks = 25;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
@@ -122,7 +116,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   if (start_is_good(frame, out.odometry)) {
     shrink_window(solution, out);
     compare_carried(out.odometry);
-    if (carried_.contradicted()) out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
+    if (carried_.contradicted()) out.odometry.health = health_.contradicted();
     return;
   }
   refuse_start(out.odometry);
@@ -151,7 +145,7 @@ void Estimator::refuse_start(Odometry& out) {
   const EstimatorStats stats = out.stats;
   out = {};
   out.stats = stats;
-  out.health = {HealthState::initialising, HealthReason::alignment_refused};
+  out.health = health_.start_refused();
 }
 
 void Estimator::open_window(const InitialSolution& start) {
@@ -369,7 +363,7 @@ void Estimator::restart() {
 void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
   const bool after_trouble = last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s;
   if (!after_trouble && !published_.pending_too_large(kAtOnce)) {
-    out.health = {HealthState::degraded, HealthReason::correction_pending};
+    out.health = health_.corrected(HealthEvidence::Correction::pending);
     return;
   }
   begin_new_W();
@@ -377,7 +371,7 @@ void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
   monitor_.count_reset();
   if (!after_trouble) return;
   monitor_.doubt_tilt();
-  out.health = {HealthState::degraded, HealthReason::contradiction};
+  out.health = health_.corrected(HealthEvidence::Correction::made);
 }
 
 /// Publishes the pose of the newest frame, continuing from the one published before (W17-W20).
