@@ -42,7 +42,10 @@ TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled, const std::opti
     : enabled_(enabled),
       given_(Duration::from_seconds(rig.time_offset_s)),
       alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {.known_offset = correction_of(kept, rig)}) {
-  if (const auto known = correction_of(kept, rig); known && enabled) correction_ = found_ = Duration::from_seconds(known->s);
+  const auto known = correction_of(kept, rig);
+  if (!known || !enabled) return;
+  correction_ = found_ = Duration::from_seconds(known->s);
+  sigma_s_ = known->sigma_s;  // and is so after a flight that shows nothing of it, too
 }
 
 bool TimeAlignment::add(const TrackedFrame& frame, bool running) {

@@ -40,7 +40,7 @@ TEST(TimeAlignment, ThatOfTheFlightBeforeIsAppliedAtOnceAndCorrectedWhereItIsNot
   for (const double late_s : {0.05, 0.02}) {
     TimeAlignment alignment(StereoRig{}, true, TimeOffsetEstimate{-0.05, 0.001});
     EXPECT_NEAR(alignment.correction().seconds(), -0.05, 1e-9);
-    EXPECT_EQ(alignment.sigma_s(), 0) << "nothing was seen yet";
+    EXPECT_NEAR(alignment.sigma_s(), 0.005, 0.0005) << "nothing was seen yet, and a driver may have changed it a little";
     Hand hand;
     hand.late_s = late_s, hand.middle_px = 0;
     for (const TrackedFrame& frame : hand.frames(1.5)) alignment.add(frame, false);

@@ -113,8 +113,8 @@ Result<std::optional<ImuState>> read_imu_state(const std::string& path, const Im
 std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
   const ImuBiasEstimate& b = state.biases;
   return fmt::format(
-             "# Biases of an IMU, and its time offset to the images, at the end of a flight (fbvins --imu-state), for the next one;\n"
-             "# covariances as upper triangles.\n"
+             "# Biases of an IMU, and its time offset to the images, at the end of a flight (fbvins --imu-state), for the next one; "
+             "covariances as upper triangles.\n"
              "imu_state: 1\nt_ns: {}\nimu:\n  rate_hz: {:.17g}\n",
              state.t.ns, n.rate_hz) +
          imu_noise_text(n, "  ", "{:.17g}") + imu_axes_text(n.axes, "  ", true) +
