@@ -5,9 +5,11 @@
 
 namespace fbvins::app {
 
-std::optional<ImuState> imu_state_of(const Odometry& o) {
+std::optional<ImuState> imu_state_of(const Odometry& o, double rig_time_offset_s) {
   if (o.health.state != HealthState::good || o.accel_bias_covariance.isZero(0)) return std::nullopt;
-  return ImuState{o.t, {o.bias, o.gyro_bias_covariance, o.accel_bias_covariance}};
+  ImuState out{o.t, {o.bias, o.gyro_bias_covariance, o.accel_bias_covariance}};
+  if (o.time_offset_sigma_s > 0) out.time_offset = TimeOffsetEstimate{rig_time_offset_s + o.time_offset_s, o.time_offset_sigma_s};
+  return out;
 }
 
 Result<std::optional<ImuState>> load_imu_state(const std::string& path, const ImuNoise& imu) {

@@ -21,20 +21,20 @@ Odometry with_bias() {
 
 TEST(ImuStateOfAFlight, IsThatOfFramesInGoodHealth) {
   Odometry o = with_bias();
-  ASSERT_TRUE(imu_state_of(o));
-  EXPECT_EQ(imu_state_of(o)->biases.bias.gyro_radps, o.bias.gyro_radps);
+  ASSERT_TRUE(imu_state_of(o, 0));
+  EXPECT_EQ(imu_state_of(o, 0)->biases.bias.gyro_radps, o.bias.gyro_radps);
   o.health.state = HealthState::degraded;
-  EXPECT_FALSE(imu_state_of(o));
+  EXPECT_FALSE(imu_state_of(o, 0));
   o = with_bias();
   o.accel_bias_covariance.setZero();  // before the window knows it
-  EXPECT_FALSE(imu_state_of(o));
+  EXPECT_FALSE(imu_state_of(o, 0));
 }
 
 TEST(ImuStateOfAFlight, WithoutAPathOrAStateNothingIsReadOrWritten) {
   const auto none = load_imu_state("", ImuNoise{});
   ASSERT_TRUE(none);
   EXPECT_FALSE(*none);
-  EXPECT_TRUE(save_imu_state("", imu_state_of(with_bias()), ImuNoise{}));
+  EXPECT_TRUE(save_imu_state("", imu_state_of(with_bias(), 0), ImuNoise{}));
   const test::Folder folder("no_imu_state");
   const std::string path = folder.path() + "/imu.yaml";
   EXPECT_TRUE(save_imu_state(path, std::nullopt, ImuNoise{}));
@@ -44,11 +44,19 @@ TEST(ImuStateOfAFlight, WithoutAPathOrAStateNothingIsReadOrWritten) {
 TEST(ImuStateOfAFlight, ComesBack) {
   const test::Folder folder("imu_state");
   const std::string path = folder.path() + "/imu.yaml";
-  ASSERT_TRUE(save_imu_state(path, imu_state_of(with_bias()), ImuNoise{}));
+  ASSERT_TRUE(save_imu_state(path, imu_state_of(with_bias(), 0), ImuNoise{}));
   const auto loaded = load_imu_state(path, ImuNoise{});
   ASSERT_TRUE(loaded) << loaded.error().message;
   ASSERT_TRUE(*loaded);
   EXPECT_EQ((*loaded)->biases.bias.gyro_radps, with_bias().bias.gyro_radps);
+}
+
+TEST(ImuStateOfAFlight, HasTheWholeTimeOffset) {
+  Odometry o = with_bias();
+  EXPECT_FALSE(imu_state_of(o, 0.01)->time_offset) << "not looked for";
+  o.time_offset_s = -0.05, o.time_offset_sigma_s = 0.001;
+  EXPECT_NEAR(imu_state_of(o, 0.01)->time_offset->s, -0.04, 1e-15);
+  EXPECT_EQ(imu_state_of(o, 0.01)->time_offset->sigma_s, 0.001);
 }
 
 }  // namespace imu_state_test

@@ -85,7 +85,7 @@ TEST(LiveFiles, InAnOldMapPosesComeOnceItIsLocalised) {
 
 TEST(LiveTotals, CountsByHealthAndKeepsTheNewestGoodBiases) {
   LiveTotals totals;
-  const auto sink = totals.make_sink();
+  const auto sink = totals.make_sink(0);
   Odometry good = odometry(0, 0), later = odometry(1, 0), lost = odometry(2, 0, HealthState::lost);
   good.accel_bias_covariance = later.accel_bias_covariance = lost.accel_bias_covariance = Mat3::Identity();
   lost.health.reason = HealthReason::no_images;

@@ -98,7 +98,7 @@ void Troubles::add(const Error& error) {
 
 Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTotals& totals,
                          Troubles& troubles) {
-  live.add_sink(totals.make_sink());
+  live.add_sink(totals.make_sink(flight.source.rig().time_offset_s));
   if (!arguments.record.empty()) add_record(arguments, flight, live, troubles);
   if (const char* address = std::getenv("NOTIFY_SOCKET")) {
     auto sink = ServiceSink::create(address, stderr);

@@ -14,7 +14,7 @@ namespace {
 
 class TotalsSink final : public Sink {
  public:
-  explicit TotalsSink(LiveTotals& totals) : totals_(totals) {}
+  TotalsSink(LiveTotals& totals, double rig_time_offset_s) : totals_(totals), rig_time_offset_s_(rig_time_offset_s) {}
   std::string_view name() const override { return "totals"; }
   Result<void> take(const LiveEvent& event) override {
     if (const auto* pose = std::get_if<LivePose>(&event)) totals_.live_poses += pose->health.has_pose() ? 1 : 0;
@@ -22,12 +22,13 @@ class TotalsSink final : public Sink {
     if (o == nullptr) return {};
     totals_.with_pose += o->health.has_pose() ? 1 : 0;
     ++totals_.health[label_of(o->health)];
-    if (auto state = imu_state_of(*o)) totals_.imu_state = state;
+    if (auto state = imu_state_of(*o, rig_time_offset_s_)) totals_.imu_state = state;
     return {};
   }
 
  private:
   LiveTotals& totals_;
+  double rig_time_offset_s_;
 };
 
 std::optional<Evaluation> accuracy(const Trajectory<W>& truth, const std::string& path) {
@@ -47,7 +48,9 @@ std::string line(const char* what, const LatencySummary& s) {
 
 }  // namespace
 
-std::unique_ptr<Sink> LiveTotals::make_sink() { return std::make_unique<TotalsSink>(*this); }
+std::unique_ptr<Sink> LiveTotals::make_sink(double rig_time_offset_s) {
+  return std::make_unique<TotalsSink>(*this, rig_time_offset_s);
+}
 
 LiveSummary summarise(const LiveTotals& totals, const std::string& source_name, const std::string& frontend, const Source& source,
                       const std::string& folder) {

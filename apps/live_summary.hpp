@@ -23,7 +23,7 @@ struct LiveTotals {
   LiveStatus last;
   std::optional<ImuState> imu_state;  ///< as of the newest image in good health
 
-  std::unique_ptr<Sink> make_sink();
+  std::unique_ptr<Sink> make_sink(double rig_time_offset_s);
 };
 
 struct LiveSummary {

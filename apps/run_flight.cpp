@@ -17,10 +17,10 @@ namespace fbvins::app {
 namespace {
 
 /// As the last frame in good health knew the IMU.
-Result<void> keep_imu_state(const std::string& path, const RunRecord& run, const ImuNoise& imu) {
+Result<void> keep_imu_state(const std::string& path, const RunRecord& run, const StereoRig& rig) {
   std::optional<ImuState> state;
-  for (auto o = run.odometry.rbegin(); o != run.odometry.rend() && !state; ++o) state = imu_state_of(*o);
-  return save_imu_state(path, state, imu);
+  for (auto o = run.odometry.rbegin(); o != run.odometry.rend() && !state; ++o) state = imu_state_of(*o, rig.time_offset_s);
+  return save_imu_state(path, state, rig.imu_noise);
 }
 
 /// Sends the anchors that are not later than the next image.
@@ -105,7 +105,7 @@ Result<Flight> run_flight(const FlightArguments& arguments, const Config& config
     finish_map(arguments.map, **map, flight->run, *flight->map);
     if (Result<void> saved = save_map(arguments.map, **map); !saved) flight->map->not_saved = saved.error().message;
   }
-  if (Result<void> kept = keep_imu_state(arguments.imu_state, flight->run, data.rig().imu_noise); !kept) return kept.error();
+  if (Result<void> kept = keep_imu_state(arguments.imu_state, flight->run, data.rig()); !kept) return kept.error();
   flight->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return flight;
 }

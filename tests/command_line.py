@@ -330,6 +330,22 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins(*run, self.write("other.yaml", kept.replace("rate_hz: 200", "rate_hz: 400"))), "other.yaml", "another IMU")
         self.assert_bad_input(fbvins(*run, self.folder), str(self.folder))
 
+    def test_imu_state_keeps_the_time_offset(self):
+        """Stamps are 30 ms early, which no calibration says; the second flight knows it from its first image on."""
+        flight, out, state = self.folder / "flight", self.folder / "out", self.folder / "imu.yaml"
+        self.assertEqual(fbvins("simulate", "handheld", "--out", flight, "--seconds", 3, "--set", "camera.time_offset_ms=30", "--quiet").returncode, 0)
+
+        def first_pose_after_s():
+            self.assertEqual(fbvins("run", flight, "--out", out, "--quiet", "--imu-state", state).returncode, 0)
+            return json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]["coverage"]["first_pose_after_s"]
+
+        unknown = first_pose_after_s()
+        kept = state.read_text(encoding="utf-8")
+        self.assertAlmostEqual(float(re.search(r"^time_offset_s: (.*)$", kept, re.M)[1]), 0.03, delta=0.002)
+        self.assertLess(first_pose_after_s(), unknown - 0.2)
+        half = re.sub(r"^time_offset_sigma_s: .*\n", "", kept, flags=re.M)
+        self.assert_bad_input(fbvins("run", flight, "--out", out, "--quiet", "--imu-state", self.write("half.yaml", half)), "half.yaml", "time_offset_sigma_s")
+
     def test_eval(self):
         rows = [f"{1.5e9 + i / 20:.9f} {i * 0.1:.3f} {(i % 7) * 0.1:.3f} {(i % 3) * 0.1:.3f} 0 0 0 1" for i in range(60)]
         truth = self.write("truth.txt", "\n".join(rows) + "\n")

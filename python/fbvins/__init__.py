@@ -105,7 +105,7 @@ def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, l
     recording: a path, or a Recording that has not been iterated yet.  frontend: "klt", "orb" or "boost"; None: as configured.
     loop: loop closure with a map; load_map, save_map, final_ba, boosted_map, positions, tags imply it.  positions, tags: files of anchors
     (docs/maps.md), by which the map comes into the frame of a building.  config: a Config, a file or a dict of options;
-    `options` override it.  imu_state: file that carries the IMU's biases from flight to flight.  progress(done, all) is called every 16 images.
+    `options` override it.  imu_state: file that carries the IMU's biases and time offset from flight to flight.  progress(done, all) is called every 16 images.
     """
     if isinstance(recording, Recording):
         if calibration or imu_calibration or max_images:

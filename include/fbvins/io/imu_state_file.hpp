@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An IMU's biases from flight to flight, as YAML with every number exact. Any thread, different files.
+// An IMU's biases and time offset from flight to flight, as YAML with every number exact. Any thread, different files.
 //
 //   Result<std::optional<ImuState>> state = read_imu_state("imu_state.yaml", rig.imu_noise);   // none: no such file yet
 //   Result<void> kept = write_imu_state("imu_state.yaml", end_of_flight, rig.imu_noise);

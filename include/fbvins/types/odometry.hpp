@@ -103,6 +103,7 @@ struct Odometry {
   bool level = false;                         ///< tilt_sigma_rad is below kLevelSigma_rad
   double scale_sigma = 0;  ///< one camera: relative standard deviation of the scale; 0 with a pair or before a pose
   double time_offset_s = 0;  ///< t_imu = t_image + the rig's offset + this, as found so far (docs/derivations/gyro_alignment.md)
+  double time_offset_sigma_s = 0;  ///< its standard deviation; 0 where it is not looked for, or not known yet
   Health health;
   std::uint32_t reset_counter =
       0;  ///< +1 whenever W is a new frame: after a restart, or a correction too large to be made slowly

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/accumulated_doubt.hpp"
 
-#include "fbvins/core/angle.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr double kLarge_m = 0.1, kLarge_rad = 3 * kDegree;
+using namespace thresholds;
 
 }  // namespace
 

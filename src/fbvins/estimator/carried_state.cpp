@@ -5,13 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/estimator/window_views.hpp"
 
 namespace fbvins {
 namespace {
 
-/// After a restart in a contradiction images and readings have to agree for this time.
-constexpr double kProven_s = 1;
+using namespace thresholds;
 
 double sigma(const Mat3& covariance) { return std::sqrt(covariance.trace()); }
 

@@ -4,17 +4,13 @@
 #include <algorithm>
 #include <iterator>
 
-#include "fbvins/core/angle.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
 namespace {
 
-/// A fault has to be older than this to have spoiled what is carried on.
-constexpr double kBefore_s = 2;
-constexpr double kRemembered_s = 30;
-/// No pose is good whose tilt is off by more; and by so many standard deviations of what is carried on.
-constexpr double kTilt_rad = 3 * kDegree, kTilt_sigma = 2;
+using namespace thresholds;
 
 Vec3 turn_between(const Vec3& from, const Vec3& to) { return so3_log(Quat::FromTwoVectors(from, to)); }
 
@@ -28,8 +24,8 @@ void CarriedUp::carry(Time t, const ImuSegment& readings) {
   now_ = t;
   if (readings.empty() || readings.longest_gap.seconds() > kReadingsGap_s) return forget();
   if (before_) before_->up_B = carried(before_->up_B, readings, before_->gyro_bias_radps);
-  if (before_ && (t - since_).seconds() > kRemembered_s) before_.reset();
-  if (!recent_.empty() && (t - recent_.front().t).seconds() > kRemembered_s) recent_.clear();
+  if (before_ && (t - since_).seconds() > kUpRemembered_s) before_.reset();
+  if (!recent_.empty() && (t - recent_.front().t).seconds() > kUpRemembered_s) recent_.clear();
   recent_.push_back({t, readings, {}});
 }
 
@@ -40,7 +36,7 @@ void CarriedUp::take(const Known& known) {
   for (auto e = first; e != recent_.end() && (now_ - e->t).seconds() >= kBefore_s; ++e)
     if (e->known) first = e;
   recent_.erase(recent_.begin(), first);
-  const bool agree = before_ && turn_between(known.up_B, before_->up_B).norm() <= kTilt_rad;
+  const bool agree = before_ && turn_between(known.up_B, before_->up_B).norm() <= kUpAway_rad;
   if (agree && (now_ - recent_.front().t).seconds() >= kBefore_s) before_.reset();  // confirmed
 }
 
@@ -71,7 +67,7 @@ std::optional<CarriedUp::Difference> CarriedUp::difference(const Vec3& up_B, con
       Vec3(before_->sigma_rad, before_->gyro_sigma_radps * dt_s, (gyro_bias_radps - before_->gyro_bias_radps).norm() * dt_s)
           .norm();
   const Vec3 turn_B = turn_between(up_B, before_->up_B);
-  return Difference{turn_B, restarted_ && turn_B.norm() > kTilt_rad + kTilt_sigma * sigma_rad};
+  return Difference{turn_B, restarted_ && turn_B.norm() > kUpAway_rad + kUpAway_sigma * sigma_rad};
 }
 
 }  // namespace fbvins

@@ -19,9 +19,6 @@
 
 namespace fbvins {
 
-/// Without readings for longer than this, attitude and velocity are not known any more.
-inline constexpr double kReadingsGap_s = 0.05;
-
 class CarriedUp {
  public:
   struct Known {

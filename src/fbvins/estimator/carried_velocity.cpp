@@ -6,27 +6,13 @@
 #include <iterator>
 #include <utility>
 
-#include "fbvins/estimator/carried_up.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
 namespace {
 
-/// Landmarks that join one image to an earlier one, and how many of those in view they have to be.
-constexpr std::size_t kFewestLinked = 8;
-constexpr double kLinked = 0.5;
-/// Fewer landmarks prove nothing.
-constexpr std::size_t kFewestToJudge = 15;
-constexpr double kCarriedFor_s = 30;
-/// No good velocity is off by more; and by so many standard deviations of what is carried on.
-constexpr double kVelocity_mps = 0.3, kVelocity_sigma = 5;
-/// What scale, axes and vibration of an accelerometer add to its bias.
-constexpr double kAccel_mps2 = 0.03;
-/// So long the readings are carried on while images contradict them.
-constexpr double kDisputed_s = 0.2;
-/// As well as this a velocity is known in any case.
-constexpr double kKnown_mps = 0.1;
-constexpr double kMovedAlong_m = 0.1;
+using namespace thresholds;
 
 }  // namespace
 

@@ -10,6 +10,7 @@
 #include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/estimator/mono_start.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/types/protection.hpp"
@@ -17,13 +18,9 @@
 namespace fbvins {
 namespace {
 
+using namespace thresholds;
+
 constexpr double kRestForStandstill_s = 0.5;
-/// Images with readings after a gap, until velocity and attitude are known again.
-constexpr int kFramesAfterGap = 6;
-/// A large correction so soon after a pose that was not good has to be confirmed by gravity.
-constexpr double kTrouble_s = 2;
-/// Otherwise so many times what a good pose may owe is made up for at once.
-constexpr double kAtOnce = 2;
 /// Share by which an accelerometer's axes and scale are off, of a sensor that was not calibrated up to twice as much.
 constexpr double kAxes = 0.015;
 /// Noise of one camera's stamps, beside what its tracks show of it. With one camera the readings alone give the scale, and stamps that
@@ -31,8 +28,10 @@ constexpr double kAxes = 0.015;
 constexpr double kStampOfOneCamera_s = 0.001;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.15;
-/// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
-constexpr double kContradictedOneCamera_s = 2;
+/// Likewise: 5 % of right ones are refused, and tried again with the next image (chi-square, three numbers).
+constexpr double kMaxBiasSigmasAtStart = 2.8;
+/// For so long: axes and scale of a gyroscope that nobody has calibrated look like a bias that changes.
+constexpr double kBiasRefused_s = 1;
 /// With fewer landmarks surfaces are compared as well.
 constexpr std::ptrdiff_t kEnoughLandmarks = 25;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
@@ -47,7 +46,8 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibration_(calibrated_),
       one_camera_(!has_stereo(rig)),
       uncertainty_(scale_sigma_of(rig), one_camera_, options.gravity_mps2),
-      time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset),
+      time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset,
+                      before ? before->time_offset : std::nullopt),
       exposures_(rig),
       surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
@@ -87,6 +87,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   odometry.id = frame.id;
   odometry.t = frame.t;
   odometry.time_offset_s = time_alignment_.correction().seconds();
+  odometry.time_offset_sigma_s = time_alignment_.sigma_s();
   if (running_) publish(odometry);
   odometry.reset_counter = reset_counter_;
   if (running_) carried_.remember(window_, odometry, reading_noise_.clipped());
@@ -118,18 +119,24 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   if (start_is_good(frame, out.odometry)) {
     shrink_window(solution, out);
     compare_carried(out.odometry);
-    if (carried_.contradicted()) out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
+    if (carried_.contradicted()) out.odometry.health = health_.contradicted();
     return;
   }
   refuse_start(out.odometry);
 }
 
-/// One pair of several is enough. With one camera its scale has to be known, too.
-bool Estimator::start_is_good(const TrackedFrame& frame, const Odometry& solved) const {
+/// One pair of several is enough. With one camera its scale has to be known, too, and the gyroscope's bias be one that the tracks
+/// show without a start.
+bool Estimator::start_is_good(const TrackedFrame& frame, const Odometry& solved) {
   const bool a_pair_sees = solved.health.reason == HealthReason::one_camera && frame.stats.stereo > 0;
   if (solved.health.state != HealthState::good && !a_pair_sees) return false;
   const Vec3 v_WB = window_.tilt().levelled(window_.newest().state).v_FB;
-  return !one_camera_ || scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart;
+  if (!one_camera_) return true;
+  if (!(scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart)) return false;
+  const Vec3& gyro_bias_radps = window_.newest().state.bias.gyro_radps;
+  if (time_alignment_.off_sigmas(gyro_bias_radps, solved.gyro_bias_covariance) < kMaxBiasSigmasAtStart) return true;
+  if (!bias_refused_) bias_refused_ = frame.t;
+  return (frame.t - *bias_refused_).seconds() > kBiasRefused_s;
 }
 
 /// Nothing of it is published.
@@ -141,7 +148,7 @@ void Estimator::refuse_start(Odometry& out) {
   const EstimatorStats stats = out.stats;
   out = {};
   out.stats = stats;
-  out.health = {HealthState::initialising, HealthReason::alignment_refused};
+  out.health = health_.start_refused();
 }
 
 void Estimator::open_window(const InitialSolution& start) {
@@ -296,8 +303,10 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
 }
 
 bool Estimator::contradicted_too_long(Time t) {
-  if (!one_camera_ || !monitor_.follows_images()) agreed_ = t;
-  return (t - agreed_).seconds() > kContradictedOneCamera_s;
+  const double step_s = (t - std::exchange(judged_, t)).seconds();
+  if (!one_camera_ || !monitor_.follows_images()) contradicted_s_ = 0;
+  else contradicted_s_ = std::max(0.0, contradicted_s_ + (monitor_.contradicts_now() ? step_s : -step_s));
+  return contradicted_s_ > kContradictedOneCamera_s;
 }
 
 Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
@@ -333,6 +342,7 @@ void Estimator::restart() {
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();
   running_ = false;
   calibration_ = calibrated_;
+  bias_refused_.reset();
   failed_solves_ = 0;
   ++reset_counter_;
   window_.clear();
@@ -346,7 +356,7 @@ void Estimator::restart() {
 void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
   const bool after_trouble = last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s;
   if (!after_trouble && !published_.pending_too_large(kAtOnce)) {
-    out.health = {HealthState::degraded, HealthReason::correction_pending};
+    out.health = health_.corrected(HealthEvidence::Correction::pending);
     return;
   }
   begin_new_W();
@@ -354,7 +364,7 @@ void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
   monitor_.count_reset();
   if (!after_trouble) return;
   monitor_.doubt_tilt();
-  out.health = {HealthState::degraded, HealthReason::contradiction};
+  out.health = health_.corrected(HealthEvidence::Correction::made);
 }
 
 /// Publishes the pose of the newest frame, continuing from the one published before (W17-W20).

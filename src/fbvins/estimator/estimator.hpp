@@ -75,7 +75,7 @@ class Estimator {
   void shrink_window(const WindowSolution& solution, Estimate& out);
   bool contradicted_too_long(Time t);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
-  bool start_is_good(const TrackedFrame& frame, const Odometry& solved) const;
+  bool start_is_good(const TrackedFrame& frame, const Odometry& solved);
   void compare_carried(const Odometry& solved);
   void refuse_start(Odometry& out);
   void restart();
@@ -103,7 +103,9 @@ class Estimator {
   CarriedState carried_;
   std::uint8_t wrong_cameras_ = 0;    ///< in the newest frame; bits, as in Health
   int frames_with_readings_ = 0;      ///< in a row
-  Time agreed_;                       ///< last time without a contradiction, or with two cameras
+  Time judged_;                       ///< the newest frame that was
+  double contradicted_s_ = 0;         ///< one camera: by images that contradict the readings, less those that do not
+  std::optional<Time> bias_refused_;  ///< since when starts of this try have a bias that tracks do not show
   std::optional<Time> last_trouble_;  ///< of a pose that was not good
   SlidingWindow window_;
   WindowSolver solver_;

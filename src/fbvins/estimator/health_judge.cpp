@@ -2,37 +2,43 @@
 #include "fbvins/estimator/health_judge.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "fbvins/estimator/integrity_thresholds.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr double kImuGapDegraded_s = 0.05;
-/// Between images farther apart than this, and than this many periods of the camera, others are missing.
-constexpr double kImageHole_s = 0.25, kImageHole_periods = 2.5;
-constexpr int kFailedSolvesUntilLost = 3;
-/// Larger biases are implausible.
-constexpr double kMaxGyroBias_radps = 0.5;
-constexpr double kMaxAccelBias_mps2 = 2.5;
-
-/// Of eight vehicles one shakes up to this in flight, the others half of it at most, and crashes three times as much.
-constexpr double kGyroVibrationDegraded_radps = 0.3;
+using namespace thresholds;
 
 bool without_images(const TrackedFrame& frame) {
   return !frame.has_left && !frame.has_right && std::ranges::count(frame.has_more, true) == 0;
 }
 
-Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
-Health degraded(HealthReason reason, std::uint8_t without_cameras = 0) {
-  return {HealthState::degraded, reason, without_cameras};
-}
-
 }  // namespace
 
-Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) const {
-  if (without_images(frame)) reason = HealthReason::no_images;
-  else if (const std::uint8_t missing = missing_cameras(frame); missing != 0)  // a start needs a pair
-    return {HealthState::initialising, HealthReason::one_camera, missing};
-  return {HealthState::initialising, reason};
+Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) {
+  evidence_ = {.waiting_for = reason, .without_images = without_images(frame), .missing_cameras = missing_cameras(frame)};
+  return decide();
+}
+
+Health HealthJudge::contradicted() {
+  evidence_.contradiction = true;
+  return decide();
+}
+
+Health HealthJudge::start_refused() {
+  evidence_.start_refused = true;
+  return decide();
+}
+
+Health HealthJudge::corrected(HealthEvidence::Correction correction) {
+  evidence_.correction = correction;
+  return decide();
+}
+
+Health HealthJudge::decide() const {
+  return decide_health(evidence_, {options_.max_blind_m, options_.max_speed_mps, options_.max_imu_gap_s});
 }
 
 void HealthJudge::pass(const TrackedFrame& frame) {
@@ -63,29 +69,29 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
   const bool few_tracks = landmarks_in_view < options_.min_tracks;
   if (!few_tracks) seen_sigma_m_ = evidence.worst_sigma_m;
   const double blind2 = evidence.worst_sigma_m * evidence.worst_sigma_m - seen_sigma_m_ * seen_sigma_m_;
-  const bool no_imu = frame.imu.empty();
-
-  if (!state.T_FB.p.allFinite() || evidence.failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
-  if (few_tracks && blind2 > options_.max_blind_m * options_.max_blind_m)
-    return lost(images_missing(frame) ? HealthReason::no_images : HealthReason::no_tracks);
-  if (state.v_FB.norm() > options_.max_speed_mps) return lost(HealthReason::implausible_speed);
-  if (state.bias.gyro_radps.norm() > kMaxGyroBias_radps || state.bias.accel_mps2.norm() > kMaxAccelBias_mps2)
-    return lost(HealthReason::implausible_bias);
-  if (few_tracks && (no_imu || frame.imu.longest_gap.seconds() > options_.max_imu_gap_s)) return lost(HealthReason::imu_gap);
-  if (evidence.hopeless) return lost(HealthReason::contradiction);
-  if (evidence.failed_solves > 0) return degraded(HealthReason::solver_failed);
-  if (no_imu || evidence.after_gap || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
-  if (images_missing(frame)) return degraded(HealthReason::no_images);
-  if (evidence.broken_features > 0) return degraded(HealthReason::frontend_fault);
-  if (const std::uint8_t missing = missing_cameras(frame); missing != 0) return degraded(HealthReason::one_camera, missing);
-  if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
-  if (few_tracks || evidence.after_dark) return degraded(HealthReason::few_tracks);
-  if (stereo_ && frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
-  if (evidence.wrong_cameras != 0) return degraded(HealthReason::cameras_disagree, evidence.wrong_cameras);
-  if (evidence.clipped) return degraded(HealthReason::imu_clipped);
-  if (evidence.contradiction) return degraded(HealthReason::contradiction);
-  if (evidence.gyro_vibration_radps > kGyroVibrationDegraded_radps) return degraded(HealthReason::imu_vibration);
-  return {HealthState::good, HealthReason::none};
+  evidence_ = {.without_images = without_images(frame),
+               .images_missing = images_missing(frame),
+               .missing_cameras = missing_cameras(frame),
+               .broken_features = evidence.broken_features,
+               .landmarks_in_view = landmarks_in_view,
+               .few_tracks = few_tracks,
+               .blind_m = std::sqrt(std::max(0.0, blind2)),
+               .no_pair_sees = stereo_ && frame.stats.stereo == 0,
+               .after_dark = evidence.after_dark,
+               .no_readings = frame.imu.empty(),
+               .longest_gap_s = frame.imu.longest_gap.seconds(),
+               .after_gap = evidence.after_gap,
+               .clipped = evidence.clipped,
+               .gyro_vibration_radps = evidence.gyro_vibration_radps,
+               .finite = state.T_FB.p.allFinite(),
+               .failed_solves = evidence.failed_solves,
+               .speed_mps = state.v_FB.norm(),
+               .gyro_bias_radps = state.bias.gyro_radps.norm(),
+               .accel_bias_mps2 = state.bias.accel_mps2.norm(),
+               .contradiction = evidence.contradiction,
+               .hopeless = evidence.hopeless,
+               .wrong_cameras = evidence.wrong_cameras};
+  return decide();
 }
 
 }  // namespace fbvins

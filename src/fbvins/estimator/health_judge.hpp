@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Health of the estimate and its reason: missing sensor data, few tracks, implausible states. Causes take precedence over
-// their symptoms: an image that did not come is `no_images`, not `no_tracks`. One owner, one thread.
+// Gathers what speaks against a frame, and remembers what was seen before it; decide_health() (health_decision.hpp) says what
+// that means. One owner, one thread.
 #pragma once
 
 #include <optional>
 
 #include "fbvins/core/sample_period.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/health_decision.hpp"
 #include "fbvins/imu/nav_state.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -37,15 +38,21 @@ class HealthJudge {
   /// Health at a frame in the window, after its solve.
   Health judge(const TrackedFrame& frame, const NavState<G>& state, int landmarks_in_view, const Evidence& evidence);
   /// Health at a frame before the start; `reason` is what the initialiser waits for.
-  Health before_start(const TrackedFrame& frame, HealthReason reason) const;
+  Health before_start(const TrackedFrame& frame, HealthReason reason);
+  /// And of the frame that was judged last, when more is known of it.
+  Health contradicted();
+  Health start_refused();
+  Health corrected(HealthEvidence::Correction correction);
   /// To be called after each frame, whether it was judged or not.
   void pass(const TrackedFrame& frame);
 
  private:
+  Health decide() const;
   bool images_missing(const TrackedFrame& frame) const;
   std::uint8_t missing_cameras(const TrackedFrame& frame) const;
 
   EstimatorOptions options_;
+  HealthEvidence evidence_;  ///< of the newest frame
   int cameras_;
   bool stereo_;
   std::optional<Time> previous_image_;

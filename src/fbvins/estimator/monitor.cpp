@@ -7,51 +7,12 @@
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/estimator/camera_residuals.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 
 namespace fbvins {
 namespace {
 
-/// Median residuals at the predicted pose, in standard deviations of a feature: up to 1 where all is well. More is expected
-/// after a longer time.
-constexpr double kUsual_sigma = 1.5, kUsualFor_s = 0.06;
-/// Times as much while the calibration is being found.
-constexpr double kCalibrating = 6;
-/// And so many standard deviations of what the noise of readings and stamps moves all that is seen.
-constexpr double kSpread_sigma = 2;
-constexpr double kNearest_m = 0.3;
-/// What all residuals of an image have in common, on average where all is well: EuRoC's MH_01. A rig whose lens, axes and clocks are known
-/// less well has more, and is given as many times the room, up to a limit; learned from images that are in no contradiction.
-constexpr double kUsualShift = 0.17, kMostRoom = 3, kLargestLearned = 1;
-constexpr double kLearnedAtFirst_s = 2, kLearnedOver_s = 30;
-/// Where the images' own pose does not explain them much better, the prediction is not what is wrong.
-constexpr double kBetter = 0.6;
-/// Share of the landmarks that agree with one pose where images can be right against the readings.
-constexpr double kAgreeing = 0.6;
-/// CUSUM of (median / usual - 1): a contradiction from here on; no more is kept.
-constexpr double kContradiction = 1, kMost = 2;
-/// What all that a camera sees is off by, in one direction, added up with this memory: up to 2.3 where all is well. A gyroscope's
-/// axes may be off by this share of the turn.
-constexpr double kDrift_sigma = 4, kDrift_s = 0.5, kScale = 0.005;
-/// A smaller drift that lasts: cumulative sum (CUSUM) of (drift / usual - 1) over time, s. Usual is this much, and this part of
-/// what the axes explain, twice their standard deviation (W23).
-constexpr double kLasting_sigma = 1.5, kLastingScale = 0.4, kLasting_s = 0.5;
-/// What is left of a sudden drift does not last: it is forgotten after this time.
-constexpr double kForgotten_s = 1;
-/// The window's turns against the readings', in standard deviations, beyond what axes that are off by this share of the turn
-/// explain: up to 3 where all is well, up to 6.4 where images are rendered along a measured trajectory. From the first on the
-/// readings count less, from the second on they contradict each other, until they are below the third.
-constexpr double kTurnSuspected_sigma = 5, kTurn_sigma = 7, kTurnOver_sigma = 3, kTurnScale = 0.002;
-/// By then the pose may have moved by about as much, in each direction.
-constexpr double kTurnedAway_m = 0.1;
-/// The other camera, where only one drifts. A camera that was excluded for drift alone is used again after this time: the
-/// landmarks triangulated without it may be what is wrong.
-constexpr double kOther = 0.5, kReadmitted_s = 1;
-constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
-/// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is.
-constexpr double kDark_s = 0.15;
-constexpr int kSettling = 5;
-/// Two resets within a few seconds are no way to fly.
-constexpr double kNextReset_s = 5;
+using namespace thresholds;
 
 Vec3 middle_of(const std::vector<LandmarkObservation>& observations) {
   Vec3 middle;

@@ -61,6 +61,8 @@ class Monitor {
   bool contradicted() const { return contradicted_ || tilt_.in_doubt() || unexplained_; }
   /// The images are right against the readings, as far as is known.
   bool follows_images() const { return contradicted_; }
+  /// The newest image is a contradiction, and not only one within the last half second.
+  bool contradicts_now() const { return contradicted_ && calm_s_ == 0; }
   /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
   bool take_reset();
   /// W is a new one. A second time within a few seconds is hopeless.

@@ -4,19 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "fbvins/core/angle.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 
 namespace fbvins {
 namespace {
 
-/// A doubt has to be confirmed by biases that are where they were, for this time.
-constexpr double kTilt_rad = 1 * kDegree, kConfirmed_s = 1.5, kAccelBack_mps2 = 0.1, kGyroBack_radps = 0.005;
-/// No bias moves so far in so short a time. On flights without a fault no estimated one does.
-constexpr double kJump_s = 2, kAccelJump_mps2 = 0.25, kGyroJump_radps = 0.005, kMoved_sigma = 5;
-/// At the beginning, when the first errors of the start are found, they do.
-constexpr double kBegun_s = 2;
-/// Nor is it another one after a restart that this has caused.
-constexpr double kRemembered_s = 30;
+using namespace thresholds;
 
 /// A change of a bias in standard deviations, of which `floor` is the least. Of a consistent estimate the covariance of a change
 /// is what it gained or lost meanwhile, and `uncertain` more: errors of linearisation.
@@ -54,7 +47,7 @@ void TiltCheck::doubt(const BiasEstimate& before) {
 
 void TiltCheck::add_turn(const Vec3& turn_G) {
   tilt_G_ += Vec3(turn_G.x(), turn_G.y(), 0);
-  if (tilt_G_.norm() > kTilt_rad) doubt();
+  if (tilt_G_.norm() > kDoubtedTilt_rad) doubt();
 }
 
 bool TiltCheck::take(const BiasEstimate& now, bool contradicted) {
@@ -63,7 +56,7 @@ bool TiltCheck::take(const BiasEstimate& now, bool contradicted) {
   const double dt_s = biases_.empty() ? 0 : (now.t - biases_.back().t).seconds();
   biases_.push_back(now);
   while ((now.t - biases_.front().t).seconds() > kJump_s) biases_.pop_front();
-  if (refuted_ && (now.t - refuted_->t).seconds() > kRemembered_s) refuted_.reset(), before_.reset();
+  if (refuted_ && (now.t - refuted_->t).seconds() > kRefutedRemembered_s) refuted_.reset(), before_.reset();
   const BiasEstimate& from = refuted_ ? *refuted_ : biases_.front();
   if (moved(from, now, kAccelJump_mps2, kGyroJump_radps)) doubt(from);
   if (!in_doubt_ || contradicted) return false;

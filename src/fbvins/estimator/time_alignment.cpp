@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/time_alignment.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -19,13 +20,31 @@ constexpr int kInARow = 3, kSolvesOfNoise = 20;
 constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma = 2.5;
 /// In flight the correction is made in steps: a pose must not lie before the one before it.
 constexpr Duration kStep{4'000'000};
+/// The gyroscope's bias is taken from tracks that fit turns to this many of their standard deviations. Where things are close and
+/// the camera moves, its standard deviation is too small by up to the second (docs/experiments/sensors.md).
+constexpr double kFitsTurns_rms = 1, kBiasShared = 2;
+/// Drivers keep their delay from flight to flight to this, at best.
+constexpr double kKept_s = 0.005;
+
+/// Beyond the rig's. More than can be found is not believed.
+std::optional<TimeOffsetEstimate> correction_of(const std::optional<TimeOffsetEstimate>& kept, const StereoRig& rig) {
+  if (!kept) return kept;
+  const TimeOffsetEstimate beyond{kept->s - rig.time_offset_s, std::hypot(kept->sigma_s, kKept_s)};
+  if (std::abs(beyond.s) > GyroAlignment::kLargestOffset_s) return std::nullopt;
+  return beyond;
+}
 
 }  // namespace
 
-TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled)
+TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled, const std::optional<TimeOffsetEstimate>& kept)
     : enabled_(enabled),
       given_(Duration::from_seconds(rig.time_offset_s)),
-      alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {}) {}
+      alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {.known_offset = correction_of(kept, rig)}) {
+  const auto known = correction_of(kept, rig);
+  if (!known || !enabled) return;
+  correction_ = found_ = Duration::from_seconds(known->s);
+  sigma_s_ = known->sigma_s;  // and is so after a flight that shows nothing of it, too
+}
 
 bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   if (!enabled_) return false;
@@ -46,6 +65,7 @@ void TimeAlignment::solve(bool running) {
   const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
   if (!found || found->pairs < kFewestForStart) return;
   sigma_s_ = found->time_offset_sigma_s();
+  fits_turns_ = found->pairs >= kEnoughForStart && found->rms < kFitsTurns_rms ? found : std::nullopt;
   solves_ = std::min(solves_ + 1, kSolvesOfNoise);
   jitter_s_ += (found->stamp_sigma_s - jitter_s_) / solves_;
   const double off_s = std::abs(found->time_offset_s() - found_.seconds());
@@ -57,6 +77,19 @@ void TimeAlignment::solve(bool running) {
   const double line_sigmas = found_ == Duration{} ? kCertainLine_sigma : kDoubtedLine_sigma;
   if (found->pairs < kEnoughForStart || line_off_s < std::max(kLeastLine_s, line_sigmas * found->line_delay_sigma_s())) return;
   line_delay_s_ = found->line_delay_s();
+}
+
+/// An offset that is less than kLeast_s off is left as it is.
+double TimeAlignment::sigma_s() const {
+  if (sigma_s_ >= kUnknown_s) return 0;
+  return std::hypot(sigma_s_, kLeast_s / std::sqrt(3.0), (found_ - correction_).seconds());
+}
+
+double TimeAlignment::off_sigmas(const Vec3& gyro_bias_radps, const Mat3& covariance) const {
+  if (!fits_turns_) return 0;
+  const Vec3 off = gyro_bias_radps - fits_turns_->gyro_bias_radps();
+  const Mat3 of_both = kBiasShared * kBiasShared * fits_turns_->covariance.topLeftCorner<3, 3>() + covariance;
+  return std::sqrt(std::max(0.0, off.dot(of_both.ldlt().solve(off))));
 }
 
 double TimeAlignment::stamp_sigma_s() const {

@@ -30,6 +30,8 @@ constexpr double kSearchAgain = 1.4;
 constexpr std::size_t kMostSearched = 24;
 /// From here on the minimum is known.
 constexpr double kSettled_s = 0.002;
+/// A known offset that tracks and readings contradict by more is forgotten.
+constexpr double kContradicted_sigmas = 3;
 /// The tracks of two images share what is left of the readings' noise and of the lens, and pairs share images: the covariance of
 /// independent ones is too small by this factor (docs/experiments/sensors.md).
 constexpr double kShared = 3;
@@ -43,9 +45,12 @@ using Mat8 = GyroAlignmentEstimate::Mat;
 
 Vec8 information(const GyroAlignmentPrior& p) {
   Vec8 sigma;
-  sigma << Vec3::Constant(p.gyro_bias_radps), p.time_offset_s, p.line_delay_s, Vec3::Constant(p.rotation_rad);
+  sigma << Vec3::Constant(p.gyro_bias_radps), p.known_offset ? p.known_offset->sigma_s : p.time_offset_s, p.line_delay_s,
+      Vec3::Constant(p.rotation_rad);
   return sigma.array().square().inverse();
 }
+
+Vec8 mean(const GyroAlignmentPrior& p) { return (p.known_offset ? p.known_offset->s : 0) * Vec8::Unit(3); }
 
 std::vector<SeenTwice> spread_over(const std::vector<SeenTwice>& tracks, std::size_t count) {
   if (tracks.size() <= count) return tracks;
@@ -202,7 +207,7 @@ std::vector<LateImage> GyroAlignment::late_images(const Vec8& x) const {
 }
 
 GyroAlignmentEstimate GyroAlignment::solve_from(const Vec8& x, std::deque<Compared>& compared) const {
-  const Vec8 prior = information(prior_);
+  const Vec8 prior = information(prior_), known = mean(prior_);
   GyroAlignmentEstimate out;
   out.pairs = static_cast<int>(pairs_.size());
   out.x = x;
@@ -211,7 +216,7 @@ GyroAlignmentEstimate GyroAlignment::solve_from(const Vec8& x, std::deque<Compar
     out.rms = std::sqrt(std::max(0.0, normal.cost) / std::max(1.0, normal.rows));
     const Mat8 H = normal.H + Mat8(prior.asDiagonal());
     const Eigen::LDLT<Mat8> ldlt(H);
-    const Vec8 step = -(normal.compared > 0 ? kShare : 1) * ldlt.solve(normal.g + prior.cwiseProduct(out.x));
+    const Vec8 step = -(normal.compared > 0 ? kShare : 1) * ldlt.solve(normal.g + prior.cwiseProduct(out.x - known));
     out.covariance = ldlt.solve(Mat8::Identity());
     if (!step.allFinite()) break;
     out.x += step;
@@ -219,6 +224,14 @@ GyroAlignmentEstimate GyroAlignment::solve_from(const Vec8& x, std::deque<Compar
     if (step.dot(H * step) < kLeastStep_sigmas * kLeastStep_sigmas) break;
   }
   return out;
+}
+
+/// The covariance of what the solution has moved by is what it has gained.
+bool GyroAlignment::contradicts_known(const GyroAlignmentEstimate& found) const {
+  if (!prior_.known_offset) return false;
+  const double moved_s = found.time_offset_s() - prior_.known_offset->s, sigma_s = prior_.known_offset->sigma_s;
+  const double gained_s2 = sigma_s * sigma_s - found.covariance(3, 3);
+  return moved_s * moved_s > kContradicted_sigmas * kContradicted_sigmas * std::max(0.0, gained_s2);
 }
 
 /// The offset has minima beside the right one while it is hardly known.
@@ -236,6 +249,11 @@ std::optional<GyroAlignmentEstimate> GyroAlignment::solve() {
   GyroAlignmentEstimate best = solve_from(last_, compared_);
   const auto again = static_cast<std::size_t>(kSearchAgain * static_cast<double>(searched_));
   if (!settled_ && pairs_.size() >= again && pairs_.size() <= kMostSearched) search(best);
+  if (contradicts_known(best)) {
+    prior_.known_offset.reset();
+    best = solve_from(last_, compared_);
+    search(best);
+  }
   best.late = late_images(best.x);
   best.stamp_sigma_s = fbvins::stamp_sigma_s(best.late);
   last_ = best.x;

@@ -17,16 +17,18 @@
 #include "fbvins/imu/gyro_turns.hpp"
 #include "fbvins/imu/stamp_noise.hpp"
 #include "fbvins/imu/turn_by_tracks.hpp"
+#include "fbvins/types/imu_state.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
 
 /// Standard deviations before any measurement.
 struct GyroAlignmentPrior {
-  double gyro_bias_radps = 0.1;    ///< as of an unknown IMU (initial_prior.cpp)
-  double time_offset_s = 0.05;     ///< of what is given: cameras behind a driver's buffers are late by up to a tenth of a second
-  double line_delay_s = 40e-6;     ///< the common sensors take 10 to 100 us a row
-  double rotation_rad = 0.02;      ///< of a mounting by its drawing
+  double gyro_bias_radps = 0.1;                         ///< as of an unknown IMU (initial_prior.cpp)
+  double time_offset_s = 0.05;                          ///< of what is given: cameras behind a driver's buffers are late by up to a tenth of a second
+  double line_delay_s = 40e-6;                          ///< the common sensors take 10 to 100 us a row
+  double rotation_rad = 0.02;                           ///< of a mounting by its drawing
+  std::optional<TimeOffsetEstimate> known_offset = {};  ///< instead, until it is contradicted
 };
 
 /// Corrections of what the rig says.
@@ -105,6 +107,7 @@ class GyroAlignment {
   Normal linearise(const GyroAlignmentEstimate::Vec& x, std::deque<Compared>& compared) const;
   double difference_sigmas(const Pair& pair, const Compared& compared, const Turned& now) const;
   GyroAlignmentEstimate solve_from(const GyroAlignmentEstimate::Vec& x, std::deque<Compared>& compared) const;
+  bool contradicts_known(const GyroAlignmentEstimate& found) const;
   void search(GyroAlignmentEstimate& best);
   std::vector<LateImage> late_images(const GyroAlignmentEstimate::Vec& x) const;
 

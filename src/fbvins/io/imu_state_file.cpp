@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 
 #include "fbvins/core/atomic_file.hpp"
@@ -17,6 +18,7 @@ namespace {
 /// Largest plausible biases at the start of a flight.
 constexpr double kLargestGyroBias_radps = 1;
 constexpr double kLargestAccelBias_mps2 = 5;
+constexpr double kLargestTimeOffset_s = 5;  // as of a calibration
 
 std::string list(const double* values, int count) {
   std::string out;
@@ -49,6 +51,21 @@ Mat3 read_covariance(YamlReader& yaml, const char* field) {
   return m;
 }
 
+/// Both numbers or none: files of before had none.
+std::optional<TimeOffsetEstimate> read_time_offset(YamlReader& yaml) {
+  if (!yaml.has(yaml.root(), "time_offset_s") && !yaml.has(yaml.root(), "time_offset_sigma_s")) return std::nullopt;
+  const TimeOffsetEstimate out{yaml.number(yaml.root(), "time_offset_s"), yaml.number(yaml.root(), "time_offset_sigma_s")};
+  if (!(std::abs(out.s) <= kLargestTimeOffset_s))
+    yaml.complain(yaml.root(), "time_offset_s", fmt::format("is more than {} s", kLargestTimeOffset_s));
+  if (!(out.sigma_s > 0 && out.sigma_s <= kLargestTimeOffset_s))
+    yaml.complain(yaml.root(), "time_offset_sigma_s", "is not a standard deviation");
+  return out;
+}
+
+std::string text_of(const std::optional<TimeOffsetEstimate>& offset) {
+  return offset ? fmt::format("time_offset_s: {:.17g}\ntime_offset_sigma_s: {:.17g}\n", offset->s, offset->sigma_s) : std::string();
+}
+
 bool same(const ImuNoise& a, const ImuNoise& b) {
   return a.gyro_noise_density_radps_rthz == b.gyro_noise_density_radps_rthz &&
          a.accel_noise_density_mps2_rthz == b.accel_noise_density_mps2_rthz &&
@@ -61,8 +78,8 @@ bool same(const ImuNoise& a, const ImuNoise& b) {
 Result<ImuState> parse_imu_state(const std::string& text, const std::string& file, const ImuNoise& imu) {
   YamlReader yaml(file, text);
   const YAML::Node root = yaml.root();
-  yaml.only(root,
-            {"imu_state", "t_ns", "imu", "gyro_bias_radps", "accel_bias_mps2", "gyro_bias_covariance", "accel_bias_covariance"});
+  yaml.only(root, {"imu_state", "t_ns", "imu", "gyro_bias_radps", "accel_bias_mps2", "gyro_bias_covariance", "accel_bias_covariance",
+                   "time_offset_s", "time_offset_sigma_s"});
   if (const double version = yaml.number(root, "imu_state"); yaml.ok() && version != 1)
     yaml.complain(root, "imu_state", fmt::format("version {} is not known, only 1", version));
   const ImuNoise noise = read_imu_noise(yaml, yaml.get(root, "imu"), "rate_hz");
@@ -76,6 +93,7 @@ Result<ImuState> parse_imu_state(const std::string& text, const std::string& fil
                        read_bias(yaml, "accel_bias_mps2", kLargestAccelBias_mps2)};
   state.biases.gyro_covariance = read_covariance(yaml, "gyro_bias_covariance");
   state.biases.accel_covariance = read_covariance(yaml, "accel_bias_covariance");
+  state.time_offset = read_time_offset(yaml);
   if (!yaml.ok()) return yaml.error();
   return state;
 }
@@ -95,13 +113,15 @@ Result<std::optional<ImuState>> read_imu_state(const std::string& path, const Im
 std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
   const ImuBiasEstimate& b = state.biases;
   return fmt::format(
-             "# Biases of an IMU at the end of a flight (fbvins --imu-state), for the next one; covariances as upper triangles.\n"
+             "# Biases of an IMU, and its time offset to the images, at the end of a flight (fbvins --imu-state), for the next one; "
+             "covariances as upper triangles.\n"
              "imu_state: 1\nt_ns: {}\nimu:\n  rate_hz: {:.17g}\n",
              state.t.ns, n.rate_hz) +
          imu_noise_text(n, "  ", "{:.17g}") + imu_axes_text(n.axes, "  ", true) +
          fmt::format("gyro_bias_radps: {}\naccel_bias_mps2: {}\ngyro_bias_covariance: {}\naccel_bias_covariance: {}\n",
                      list(b.bias.gyro_radps.data(), 3), list(b.bias.accel_mps2.data(), 3), upper(b.gyro_covariance),
-                     upper(b.accel_covariance));
+                     upper(b.accel_covariance)) +
+         text_of(state.time_offset);
 }
 
 Result<void> write_imu_state(const std::string& path, const ImuState& state, const ImuNoise& imu) {

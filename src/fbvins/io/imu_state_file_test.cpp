@@ -42,6 +42,21 @@ TEST(ImuStateFile, GivesBackTheSameBits) {
   EXPECT_EQ(read->biases.accel_covariance, state().biases.accel_covariance);
 }
 
+TEST(ImuStateFile, ATimeOffsetIsThereWholeOrNotAtAll) {
+  EXPECT_FALSE(parse_imu_state(text(), "imu.yaml", {})->time_offset) << "as in files of before";
+  ImuState with_offset = state();
+  with_offset.time_offset = TimeOffsetEstimate{-0.05 / 3, 0.001};
+  const std::string yaml = imu_state_to_yaml(with_offset, {});
+  const Result<ImuState> read = parse_imu_state(yaml, "imu.yaml", {});
+  ASSERT_TRUE(read && read->time_offset);
+  EXPECT_EQ(read->time_offset->s, with_offset.time_offset->s);
+  EXPECT_EQ(read->time_offset->sigma_s, with_offset.time_offset->sigma_s);
+  EXPECT_NE(complaint(text() + "time_offset_s: 0.01\n").find("time_offset_sigma_s"), std::string::npos);
+  EXPECT_NE(complaint(text() + "time_offset_s: 9\ntime_offset_sigma_s: 0.001\n").find("time_offset_s: is more than 5 s"), std::string::npos);
+  EXPECT_NE(complaint(text() + "time_offset_s: 0\ntime_offset_sigma_s: 0\n").find("is not a standard deviation"), std::string::npos);
+  EXPECT_NE(complaint(text() + "time_offset_s: .nan\ntime_offset_sigma_s: 1\n").find("time_offset_s"), std::string::npos);
+}
+
 TEST(ImuStateFile, AFileOfAnotherImuIsRefused) {
   ImuNoise other;
   other.accel_random_walk_mps3_rthz = 4e-3;
