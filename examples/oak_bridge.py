@@ -16,7 +16,7 @@ import depthai as dai
 import numpy
 
 from lens_fit import WORST_FIT_PX, fitted_equidistant
-from sensor_bridge import EQUIDISTANT, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes
+from sensor_bridge import EQUIDISTANT, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes, which_and_mode
 
 WIDTH, HEIGHT, IMAGE_HZ, IMU_HZ = 640, 400, 30, 200
 CAMERAS = (dai.CameraBoardSocket.CAM_B, dai.CameraBoardSocket.CAM_C)  # left and right
@@ -127,6 +127,7 @@ def main(path, *arguments):
         sys.exit(f"images are of {WIDTH}x{HEIGHT}; say @HZ alone for another rate")
     image_hz = mode and mode[2] or IMAGE_HZ
     told = None
+    print(f"looking for {which or 'an OAK'}", file=sys.stderr, flush=True)  # the library itself waits for seconds
     while True:
         try:
             with (dai.Device(dai.DeviceInfo(which)) if which else dai.Device()) as device:

@@ -169,16 +169,34 @@ class BridgeSource(unittest.TestCase):
 
     def test_the_real_programs_without_a_device(self):
         del self.environment["FBVINS_BRIDGES"]
-        python = next((p for p in [*PYTHONS, os.environ.get("FBVINS_REALSENSE", "")] if p and os.path.exists(p)), None)
-        if python is None or subprocess.run([python, "-c", "import pyrealsense2, numpy"], capture_output=True, check=False).returncode:
-            self.skipTest("pyrealsense2 and numpy are not installed; FBVINS_REALSENSE may name a Python that has them")
-        self.environment["FBVINS_PYTHON"] = python
-        live = self.start("live", "--source", "d435i:848x480@60")
-        time.sleep(4)
-        live.send_signal(signal.SIGTERM)
-        code, _, err = self.said(live)
-        self.assertEqual(code, 2, err)
-        self.assertRegex(err, "d435i: waiting for a RealSense camera: none is plugged in|is connected")
+        tried = 0
+        for package, other, source, wanted in (("pyrealsense2", "FBVINS_REALSENSE", "d435i:848x480@60", "a RealSense camera: none is plugged in"),
+                                               ("depthai", "FBVINS_DEPTHAI", "oak:@20", "an OAK")):
+            python = next((p for p in [*PYTHONS, os.environ.get(other, "")] if p and os.path.exists(p)), None)
+            if python is None or subprocess.run([python, "-c", f"import {package}, numpy"], capture_output=True, check=False).returncode:
+                continue
+            tried += 1
+            self.environment["FBVINS_PYTHON"] = python
+            live = self.start("live", "--source", source)
+            time.sleep(6)
+            live.send_signal(signal.SIGTERM)
+            code, _, err = self.said(live)
+            self.assertIn(code, (0, 1, 2), err)
+            self.assertRegex(err, f"{source.split(':')[0]}: (waiting|looking) for {wanted}|is connected")
+        if not tried:
+            self.skipTest("neither pyrealsense2 nor depthai is installed; FBVINS_REALSENSE and FBVINS_DEPTHAI may name a Python that has them")
+
+    def test_arguments_that_no_bridge_has(self):
+        """The real programs, with stand-ins for their makers' packages: each refuses them in a sentence of its own."""
+        del self.environment["FBVINS_BRIDGES"]
+        stand_ins = self.folder / "packages"
+        stand_ins.mkdir()
+        anything = "import types, sys\nclass Any(types.ModuleType):\n    def __getattr__(self, name):\n        if name.startswith('__'):\n            raise AttributeError(name)\n" \
+                   "        return Any(name)\n    def __call__(self, *a, **k):\n        return Any('x')\nsys.modules[__name__] = Any(__name__)\n"
+        for package in ("numpy", "depthai"):
+            (stand_ins / f"{package}.py").write_text(anything, encoding="ascii")
+        self.environment["PYTHONPATH"] = str(stand_ins)
+        self.assert_fails("oak: images are of 640x400", source="oak:1280x800")
 
 
 if __name__ == "__main__":
