@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/open_source.hpp"
 
+#include <fmt/format.h>
+
 #include <string>
 
 #include "apps/bridge_source.hpp"
@@ -58,6 +60,11 @@ Result<std::unique_ptr<Source>> open_source(const std::string& name, const Sourc
     return as_source(ReplaySource::open(
         where, {.dataset = options.dataset, .laps = options.laps, .preload = options.preload, .open_file = open_any}));
 #endif
+  if (kind != "replay" && kind != "socket")
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("source '{}': it is replay:DATASET[@SPEED], socket:PATH, ros2:TOPICS, v4l2:DEVICES, d435i, oak, orbbec or "
+                             "zed:WIDTHxHEIGHT (fbvins live --help)",
+                             name)};
   return make_source(name, options);
 }
 

@@ -166,6 +166,7 @@ class BridgeSource(unittest.TestCase):
         self.assert_fails("oak: /nowhere/python3 cannot be started", "FBVINS_PYTHON")
         self.assert_fails("depth images", "librealsense2", source="d435i:depth")
         self.assert_fails("zed:672x376", source="zed")
+        self.assert_fails("source 'OAK': it is replay:", "oak, orbbec", source="OAK")
 
     def test_the_real_programs_without_a_device(self):
         del self.environment["FBVINS_BRIDGES"]
