@@ -42,6 +42,7 @@ sources:
   socket:PATH                another process, over a Unix socket (docs/socket.md); it sends its calibration, unless --calibration is given
   ros2:CAM0,CAM1,...,IMU     ROS 2 topics, in the domain of --ros2 (docs/ros2.md); needs --calibration; with depth=TOPIC depth images
   d435i[:SERIAL or FILE.bag][:depth][:848x480@60]  a RealSense camera with an IMU, by its factory calibration (docs/d435i.md)
+  oak[:DEVICE][:@HZ], orbbec[:SERIAL][:640x480@30], zed[:/dev/videoN]:672x376  by their makers' Python packages (docs/devices.md)
   v4l2:CAM0,CAM1,...,IMU     video devices, or one with all images side by side; the IMU is a flight controller's (udp:..., serial:...)
                              or another process's (socket:...); needs --calibration (docs/v4l2.md)
 faults to inject for tests, in seconds of the flight: --fault KIND:START:LENGTH[:AMOUNT]

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sends a RealSense D435i or D455 to `fbvins live --source socket:PATH`, by Intel's Python package (pip install pyrealsense2 numpy).
 
+`fbvins live --source d435i` starts it where the program was built without librealsense.
+
 usage: d435i_bridge.py SOCKET [SERIAL or FILE.bag] [WIDTHxHEIGHT[@HZ]]    runs until Ctrl-C, or the recording's end; waits for a camera
 that is unplugged, and for fbvins, which may start later or anew. Without a size: the one nearest to 640x480@30.
 """
-import re
 import sys
 import threading
 import time
@@ -13,7 +14,7 @@ import time
 import numpy
 import pyrealsense2 as rs
 
-from sensor_bridge import RADTAN, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes
+from sensor_bridge import RADTAN, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes, which_and_mode
 
 IMU_NOISE = (2.44e-4, 1.9393e-5, 1.47e-3, 3.0e-3)  # densities from the BMI055's data sheet, random walks assumed (docs/d435i.md)
 LONGEST_EXPOSURE_US = 8000  # of automatic exposure, where the camera has such a limit
@@ -185,7 +186,7 @@ class Camera:
                 "driver": None if port is None else "kernel" if port.startswith("/") else "user space", "clock": self.seen.clock,
                 "emitter": self.seen.emitter_word(stereo), "mode": own,
                 "other_modes": " ".join(m for m in self.modes().split() if m != own and m in OTHER_MODES) or None,
-                "set_mode": "the bridge's last argument",
+                "set_mode": "--source d435i:MODE",
                 "exposure_ms": None if self.seen.exposure_us is None else self.seen.exposure_us / 1e3,
                 "longest_exposure_ms": self.longest_exposure_ms(stereo),
                 "imu_calibrated": not all(is_identity(p.get_motion_intrinsics()) for p in (self.gyro, self.accel))}
@@ -203,6 +204,12 @@ class Camera:
 
 def find(context, which):
     return next((d for d in context.query_devices() if which in ("", d.get_info(rs.camera_info.serial_number))), None)
+
+
+def who_is_missing(context, which):
+    there = [d.get_info(rs.camera_info.serial_number) for d in context.query_devices() if d.supports(rs.camera_info.serial_number)]
+    wanted = f"the RealSense camera {which}" if which else "a RealSense camera"
+    return f"waiting for {wanted}: " + (f"there is {', '.join(there)}" if there else "none is plugged in, or may be opened by this user (udev rules)")
 
 
 class Watch:
@@ -251,18 +258,22 @@ def serve(camera, over, watch):
     print(f"the camera's stream has ended: {camera.failure or 'unplugged, or the end of its recording'}", file=sys.stderr)
 
 
-def main(path, *which_and_mode):
-    mode = re.fullmatch(r"(\d+)x(\d+)(?:@(\d+))?", which_and_mode[-1]) if which_and_mode else None
-    which = which_and_mode[0] if len(which_and_mode) > (mode is not None) else ""
-    wanted = mode and tuple(int(n or 0) for n in mode.groups())
-    context, recorded = rs.context(), which.endswith(".bag")
+def main(path, *arguments):
+    which, wanted = which_and_mode(arguments)
+    if wanted and not wanted[0]:
+        wanted = (640, 480, wanted[2])
+    context, recorded, told = rs.context(), which.endswith(".bag"), None
     watch = Watch(recorded)
     while True:
         device = context.load_device(which) if recorded else find(context, which)
         if device is None:
+            missing = who_is_missing(context, which)
+            if missing != told:
+                print(missing, file=sys.stderr, flush=True)
+            told = missing
             time.sleep(0.5)
             continue
-        over = threading.Event()
+        told, over = None, threading.Event()
         context.set_devices_changed_callback(lambda event: event.was_removed(device) and over.set())
         if recorded:
             device.set_status_changed_callback(lambda status: status == rs.playback_status.stopped and over.set())

@@ -4,7 +4,10 @@
 Luxonis's Python package (pip install "depthai>=3" numpy). Dot projector and flood light are switched off; the calibration is the
 device's own. Never tried with a device (docs/devices.md).
 
-usage: oak_bridge.py SOCKET [FRAMES_A_SECOND]    runs until Ctrl-C; waits for a device that is unplugged, and for fbvins
+`fbvins live --source oak` starts it.
+
+usage: oak_bridge.py SOCKET [DEVICE] [[640x400]@HZ]    runs until Ctrl-C; waits for a device that is unplugged, and for fbvins. DEVICE: its
+id or address, as Luxonis's library names it
 """
 import sys
 import time
@@ -13,7 +16,7 @@ import depthai as dai
 import numpy
 
 from lens_fit import WORST_FIT_PX, fitted_equidistant
-from sensor_bridge import EQUIDISTANT, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes
+from sensor_bridge import EQUIDISTANT, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes, which_and_mode
 
 WIDTH, HEIGHT, IMAGE_HZ, IMU_HZ = 640, 400, 30, 200
 CAMERAS = (dai.CameraBoardSocket.CAM_B, dai.CameraBoardSocket.CAM_C)  # left and right
@@ -118,13 +121,18 @@ def fly(device, path, image_hz):
     link.close()
 
 
-def main(path, image_hz=IMAGE_HZ):
+def main(path, *arguments):
+    which, mode = which_and_mode(arguments)
+    if mode and mode[:2] not in ((0, 0), (WIDTH, HEIGHT)):
+        sys.exit(f"images are of {WIDTH}x{HEIGHT}; say @HZ alone for another rate")
+    image_hz = mode and mode[2] or IMAGE_HZ
     told = None
+    print(f"looking for {which or 'an OAK'}", file=sys.stderr, flush=True)  # the library itself waits for seconds
     while True:
         try:
-            with dai.Device() as device:
+            with (dai.Device(dai.DeviceInfo(which)) if which else dai.Device()) as device:
                 told = None
-                fly(device, path, float(image_hz))
+                fly(device, path, image_hz)
         except RuntimeError as error:  # there is no device, or it was unplugged
             if str(error) != told:
                 print(f"waiting for an OAK: {error}", file=sys.stderr, flush=True)

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sends an Orbbec stereo camera with an IMU (Gemini 330 series) to `fbvins live --source socket:PATH`, by Orbbec's Python package
 (pip install pyorbbecsdk2 numpy). The laser is switched off; the calibration is the device's own. Never tried with a device
-(docs/devices.md).
+(docs/devices.md). `fbvins live --source orbbec` starts it.
 
-usage: orbbec_bridge.py SOCKET [WIDTHxHEIGHT@HZ]    runs until Ctrl-C; waits for a device that is unplugged, and for fbvins
+usage: orbbec_bridge.py SOCKET [SERIAL] [WIDTHxHEIGHT[@HZ]]    runs until Ctrl-C; waits for a device that is unplugged, and for fbvins
 """
 import re
 import sys
@@ -15,7 +15,7 @@ import numpy
 import pyorbbecsdk as ob
 
 from lens_fit import WORST_FIT_PX, fitted_equidistant
-from sensor_bridge import EQUIDISTANT, RADTAN, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes
+from sensor_bridge import EQUIDISTANT, RADTAN, Link, MergedImu, StereoPairs, camera_bytes, rig_bytes, which_and_mode
 
 MODE, IMU_HZ = (640, 480, 30), 200
 IMU_NOISE = (1.22e-4, 1.9393e-5, 1.57e-3, 3.0e-3)  # densities from the BMI270's data sheet, random walks assumed
@@ -104,7 +104,7 @@ def facts(device, mode, is_global):
     info = device.get_device_info()
     usb = re.search(r"USB(\d[\d.]*)", info.get_connection_type())
     return {"model": info.get_name(), "firmware": info.get_firmware_version(), "usb": usb and usb[1], "clock": "global" if is_global else "device",
-            "mode": "{}x{}@{}".format(*mode), "set_mode": "the bridge's last argument"}
+            "mode": "{}x{}@{}".format(*mode), "set_mode": "--source orbbec:MODE"}
 
 
 def fly(device, path, mode):
@@ -155,8 +155,9 @@ def profiles(config):
         yield profile
 
 
-def main(path, mode=None):
-    wanted = tuple(int(n) for n in re.fullmatch(r"(\d+)x(\d+)@(\d+)", mode).groups()) if mode else MODE
+def main(path, *arguments):
+    which, mode = which_and_mode(arguments)
+    wanted = tuple(said or own for said, own in zip(mode or MODE, MODE))
     context, told = ob.Context(), None
     while True:
         try:
@@ -164,7 +165,7 @@ def main(path, mode=None):
             if devices.get_count() == 0:
                 raise ob.OBError("there is none")
             told = None
-            fly(devices.get_device_by_index(0), path, wanted)
+            fly(devices.get_device_by_serial_number(which) if which else devices.get_device_by_index(0), path, wanted)
         except ob.OBError as error:
             if str(error) != told:
                 print(f"waiting for an Orbbec camera: {error}", file=sys.stderr, flush=True)

@@ -5,6 +5,7 @@ import collections
 import fcntl
 import mmap
 import os
+import re
 import socket
 import struct
 import sys
@@ -19,6 +20,17 @@ PATIENCE_S = 2  # of a connection: longer silence or blocking means that it is d
 LONGEST_STEP_NS = 50_000_000  # between two readings of the accelerometer
 RIG_BYTES = 392
 RADTAN, EQUIDISTANT = 0, 1  # FbvinsSocketCamera::model
+
+
+def which_and_mode(arguments):
+    """Of a bridge's arguments after the socket, [DEVICE] [WIDTHxHEIGHT[@HZ] or @HZ]: the device, or "", and (width, height, hz), 0 where
+    it is not said; None without a mode."""
+    rest = list(arguments)
+    said = re.fullmatch(r"(?:(\d+)x(\d+))?(?:@(\d+))?", rest[-1]) if rest and rest[-1] else None
+    mode = tuple(int(n or 0) for n in said.groups()) if said and rest.pop() else None
+    if len(rest) > 1:
+        sys.exit(f"too many arguments: {' '.join(arguments)}")
+    return rest[0] if rest else "", mode
 
 
 def camera_bytes(model, focal_px, centre_px, distortion, T_BC):

@@ -61,10 +61,6 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(done.stdout, "")
         self.assertNotIn("\033", done.stderr, "colour only on a terminal")
 
-    def test_a_device_without_a_source_is_named_with_its_program(self):
-        for device, script in (("oak", "oak_bridge.py"), ("orbbec:1", "orbbec_bridge.py"), ("realsense", "d435i_bridge.py")):
-            self.assert_bad_input(fbvins("live", "--source", device), "pip install", f"examples/{script}", "--source socket:")
-
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
         for command in ([], ["run"], ["calibrate"], ["target"], ["simulate", "board"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"], ["view"], ["map"], ["record"], ["px4"]):

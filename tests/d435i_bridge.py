@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Runs examples/d435i_bridge.py between librealsense's software device and `fbvins live`, in wall time (30 s): there are poses, also
-after the camera was unplugged and plugged in again; `--check` says what the device is, and what to do; streams that stop are started again.
+after the camera was unplugged and plugged in again; `--check` says what the device is, and what to do; streams that stop are started again;
+`--source d435i` starts the bridge by itself.
 
 usage: d435i_bridge.py FBVINS    skipped (77) where Python has no pyrealsense2; FBVINS_REALSENSE names a Python that has
 """
@@ -168,8 +169,47 @@ def is_checked(program, folder):
         assert words in said, words
 
 
+# The bridge as `fbvins live` starts it, with the software device in the place of all that are plugged in.
+PLUGGED_IN = """
+import importlib.util, sys, threading, time
+spec = importlib.util.spec_from_file_location("this_test", {test!r})
+test = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(test)
+software = test.SoftwareCamera()
+
+class Context:
+    def query_devices(self):
+        return [software.device]
+
+    def set_devices_changed_callback(self, callback):
+        threading.Timer(2, software.fly, (8,)).start()
+
+test.rs.context = Context
+test.d435i_bridge.main(*sys.argv[1:])
+"""
+
+
+def is_started(program, folder):
+    bridges, out = folder / "bridges", folder / "started"
+    bridges.mkdir()
+    (bridges / "d435i_bridge.py").write_text(PLUGGED_IN.format(test=os.path.abspath(__file__)), encoding="ascii")
+    live = subprocess.Popen([program, "live", "--source", "d435i:123456:640x480@20", "--out", out, "--quiet"], stderr=subprocess.PIPE, text=True,
+                            env={**os.environ, "FBVINS_BRIDGES": str(bridges), "FBVINS_PYTHON": sys.executable})
+    try:
+        time.sleep(12)
+        live.send_signal(signal.SIGTERM)
+        _, said = live.communicate(timeout=60)
+    finally:
+        live.kill()
+    print(said)
+    assert live.returncode == 0 and "d435i: D435i bridge is connected" in said, said
+    poses = (out / "trajectory_tum.txt").read_text(encoding="ascii").splitlines()
+    assert len(poses) > 60, f"{len(poses)} poses of 160 images"
+
+
 def main(program):
     with tempfile.TemporaryDirectory() as folder:
+        is_started(program, pathlib.Path(folder))
         flies(program, pathlib.Path(folder))
         is_checked(program, pathlib.Path(folder))
     return 0

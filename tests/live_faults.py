@@ -25,7 +25,11 @@ SCENARIOS = [
     ("cameras off for 11 s", "klt", ["--laps", "2", "--fault", "camera_off:4:11"]),
     ("one camera off, one frozen, images lost", "boost", ["--fault", "left_off:4:1.5", "--fault", "right_frozen:7:1.5", "--fault", "lose_images:9:4:0.3"]),
     ("a clock that jumps, and bursts", "orb", ["--fault", "leap:4:2:1", "--fault", "burst:8:4:0.2"]),
+    ("a clock that is set back", "klt", ["--fault", "leap:6:100:-0.3"]),
+    ("a device that begins again", "klt", ["--fault", "unplugged:6:1.5", "--fault", "leap:7:100:-100000"]),
 ]
+COUNTS = {"a clock that jumps, and bursts": {"clock_leaps": 4, "clock_set_back": 0}, "a clock that is set back": {"clock_leaps": 2, "clock_set_back": 1, "resets": 1},
+          "a device that begins again": {"clock_leaps": 2, "clock_set_back": 1, "resets": 1}}
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 STARTED_S, ENDED_S = 60, 400
 
@@ -159,7 +163,7 @@ def fly(arguments, folder, frontend, more):
     return code, "".join(said), controller, visitor
 
 
-def faults_of(folder, code, said, controller, visitor):
+def faults_of(name, folder, code, said, controller, visitor):
     """What is wrong with the flight's end and its outputs."""
     if code != 0:
         return [f"exit code {code}"]
@@ -167,6 +171,7 @@ def faults_of(folder, code, said, controller, visitor):
     summary = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
     if not summary["live"]["images"]:
         wrong.append("no image was estimated")
+    wrong += [f"{count} is {summary['live'][count]}, not {wanted}" for count, wanted in COUNTS.get(name, {}).items() if summary["live"][count] != wanted]
     record = (folder / "flight.mcap").read_bytes()
     if not (record.startswith(MCAP_MAGIC) and record.endswith(MCAP_MAGIC)):
         wrong.append("the record was not finished")
@@ -199,7 +204,7 @@ def main():
             folder = pathlib.Path(folder)
             begin = time.monotonic()
             code, said, controller, visitor = fly(arguments, folder, frontend, more)
-            wrong = faults_of(folder, code, said, controller, visitor)
+            wrong = faults_of(name, folder, code, said, controller, visitor)
         print(f"{frontend}, {name}: {'; '.join(wrong) or 'fine'} ({time.monotonic() - begin:.0f} s, {controller.poses} poses to the flight controller)",
               flush=True)
         if wrong:

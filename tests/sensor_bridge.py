@@ -123,7 +123,19 @@ def reconnecting():
         link.close()
 
 
+def arguments():
+    for said, wanted in (((), ("", None)), (("123",), ("123", None)), (("848x480@60",), ("", (848, 480, 60))), (("123", "848x480"), ("123", (848, 480, 0))),
+                         (("a.bag", "@20"), ("a.bag", (0, 0, 20)))):
+        assert bridge.which_and_mode(said) == wanted, (said, bridge.which_and_mode(said))
+    try:
+        bridge.which_and_mode(("123", "456"))
+    except SystemExit as error:
+        assert "too many" in str(error)
+    else:
+        raise AssertionError("two devices")
+
+
 if __name__ == "__main__":
-    for test in (pairing, stamps_that_differ, merging, reconnecting):
+    for test in (pairing, stamps_that_differ, merging, reconnecting, arguments):
         test()
         print(f"ok {test.__name__}")

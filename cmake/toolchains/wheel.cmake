@@ -23,10 +23,14 @@ set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
 set(ENV{PKG_CONFIG_SYSROOT_DIR} ${FBVINS_SYSROOT})
 set(ENV{PKG_CONFIG_LIBDIR} ${FBVINS_SYSROOT}/usr/lib/${machine}-linux-gnu/pkgconfig:${FBVINS_SYSROOT}/usr/lib/pkgconfig:${FBVINS_SYSROOT}/usr/share/pkgconfig)
 
-# The C++ library is part of the module, and nobody else's: where the wheel is installed there may be an older one. The compiler looks for
+# The C++ library is part of the module and of each program, and nobody else's: where the wheel is installed there may be an older one. The compiler looks for
 # libraries beside itself first, so the older ones are named before.
 set(libraries "-L${FBVINS_SYSROOT}/lib/${machine}-linux-gnu -L${FBVINS_SYSROOT}/usr/lib/${machine}-linux-gnu -L${FBVINS_SYSROOT}/usr/lib")
 set(CMAKE_C_FLAGS_INIT "-include ${CMAKE_CURRENT_LIST_DIR}/wheel_symbols.h")
 set(CMAKE_CXX_FLAGS_INIT "${CMAKE_C_FLAGS_INIT}")
+set(own_libraries "${libraries} ${FBVINS_SYSROOT}/usr/lib/wheel_shims.o -static-libstdc++")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "${libraries}")
-set(CMAKE_MODULE_LINKER_FLAGS_INIT "${libraries} ${FBVINS_SYSROOT}/usr/lib/wheel_shims.o -static-libstdc++ -Wl,--exclude-libs,ALL")
+if(EXISTS ${FBVINS_SYSROOT}/usr/lib/wheel_shims.o)  # not yet while the first libraries are made
+  set(CMAKE_EXE_LINKER_FLAGS_INIT "${own_libraries}")
+endif()
+set(CMAKE_MODULE_LINKER_FLAGS_INIT "${own_libraries} -Wl,--exclude-libs,ALL")

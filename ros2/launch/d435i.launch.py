@@ -1,51 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A RealSense D435i, by the program's own driver or by a bridge.
+A RealSense D435i; where the program was built without librealsense: pip install pyrealsense2 numpy.
 
-Where the program was built without librealsense, `bridge` starts examples/d435i_bridge.py
-(pip install pyrealsense2 numpy).
-
-ros2 launch fbvins_ros2 d435i.launch.py bridge:=$HOME/fbvins/examples/d435i_bridge.py rviz:=true
+ros2 launch fbvins_ros2 d435i.launch.py camera:=d435i:848x480@60 rviz:=true
 """
 
 from launch import LaunchDescription
-from launch.actions import (
-    DeclareLaunchArgument,
-    ExecuteProcess,
-    IncludeLaunchDescription,
-    OpaqueFunction,
-)
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
-
-
-def camera(context):
-    bridge = LaunchConfiguration("bridge").perform(context)
-    socket = LaunchConfiguration("socket").perform(context)
-    actions = [ExecuteProcess(cmd=["python3", bridge, socket], output="screen")] if bridge else []
-    source = "socket:" + socket if bridge else "d435i"
-    return [
-        *actions,
-        IncludeLaunchDescription(
-            PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/live.launch.py"]),
-            launch_arguments={"source": source}.items(),
-        ),
-    ]
 
 
 def generate_launch_description():
     return LaunchDescription(
         [
             DeclareLaunchArgument(
-                "bridge",
-                default_value="",
-                description="path of d435i_bridge.py; empty: the program's own driver",
+                "camera",
+                default_value="d435i",
+                description="d435i[:SERIAL][:WIDTHxHEIGHT[@HZ]]",
             ),
-            DeclareLaunchArgument(
-                "socket",
-                default_value="/tmp/fbvins.sock",
-                description="between the bridge and fbvins",
+            IncludeLaunchDescription(
+                PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/live.launch.py"]),
+                launch_arguments={"source": LaunchConfiguration("camera")}.items(),
             ),
-            OpaqueFunction(function=camera),
         ]
     )

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-An OAK by its bridge, examples/oak_bridge.py (pip install depthai numpy); others likewise.
+An OAK (pip install depthai numpy), or an Orbbec camera (pip install pyorbbecsdk2 numpy).
 
-ros2 launch fbvins_ros2 oak.launch.py bridge:=$HOME/fbvins/examples/oak_bridge.py rviz:=true
+ros2 launch fbvins_ros2 oak.launch.py rviz:=true
+ros2 launch fbvins_ros2 oak.launch.py camera:=orbbec
 """
 
 from launch import LaunchDescription
@@ -15,13 +16,13 @@ def generate_launch_description():
     return LaunchDescription(
         [
             DeclareLaunchArgument(
-                "bridge",
-                default_value="oak_bridge.py",
-                description="path of oak_bridge.py, or of orbbec_bridge.py",
+                "camera",
+                default_value="oak",
+                description="oak[:DEVICE][:@HZ], or orbbec[:SERIAL][:WIDTHxHEIGHT[@HZ]]",
             ),
             IncludeLaunchDescription(
-                PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/d435i.launch.py"]),
-                launch_arguments={"bridge": LaunchConfiguration("bridge")}.items(),
+                PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/live.launch.py"]),
+                launch_arguments={"source": LaunchConfiguration("camera")}.items(),
             ),
         ]
     )

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "fbvins/bags/bag_contents.hpp"
@@ -38,6 +39,16 @@ std::string small_message(int kind, Time t) {
   if (kind == 1) append_imu(out, ImuSample{t}, {});
   else if (kind == 4) append_camera_info(out, t, "left", Camera(DoubleSphere{9, 9, 4, 3, -0.2, 0.6}, 8, 6));
   else append_image(out, t, "left", &image);
+  return out;
+}
+
+/// A camera_info whose images are rectified: R turns, P has another focal length and the baseline.
+std::string rectified_message() {
+  std::string out;
+  append_camera_info(out, Time{1000}, "right", Camera(PinholeRadtan{9, 9, 4, 3, -0.1, 0.01, 0, 0}, 8, 6));
+  const std::size_t P = out.size() - 25 - 12 * sizeof(double);  // before binning and region of interest
+  overwrite_le(out, P, 8.0);
+  overwrite_le(out, P + 3 * sizeof(double), -0.8);
   return out;
 }
 
@@ -167,6 +178,7 @@ void fuzz_sqlite_bag(std::string_view bytes) {
 std::vector<std::string> message_seeds() {
   std::vector<std::string> out;
   for (const int kind : {1, 2, 3, 4}) out.push_back("c" + small_message(kind, Time{1000}));
+  out.push_back("c" + rectified_message());
   // In ROS 1's order a header begins with its number, and nothing is aligned.
   out.push_back("1" + std::string(400, '\0'));
   return out;
@@ -183,6 +195,11 @@ void fuzz_message(std::string_view bytes) {
   const auto camera = camera_of(bytes, encoding);
   require_sentence(camera);
   if (camera) require(camera->camera.width() > 0 && camera->camera.focal_px() > 0);
+  if (camera && camera->rectified) {
+    const BagCamera::Rectified& r = *camera->rectified;
+    require(r.camera.width() > 0 && r.camera.focal_px() > 0 && std::isfinite(r.x_m));
+    require((r.R_rectified_raw * r.R_rectified_raw.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 2e-3);
+  }
   for (const BagTransform& transform : transforms_of(bytes, encoding)) require(std::abs(transform.q.norm() - 1) < 1e-9);
   if (const auto transform = transform_of(bytes, encoding)) require(std::abs(transform->q.norm() - 1) < 1e-9);
   for (const char* type : {"geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped", "nav_msgs/Odometry"})
@@ -213,6 +230,11 @@ std::vector<std::string> foreign_calibration_seeds() {
       "camera_model: pinhole\nintrinsics: [4, 4, 3, 2]\ndistortion_model: radtan\ndistortion_coefficients: [0, 0, 0, 0]\n",
       "imu0:\n  T_i_b: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n  time_offset: 0\n  accelerometer_noise_density: 1\n"
       "  accelerometer_random_walk: 1\n  gyroscope_noise_density: 1\n  gyroscope_random_walk: 1\n  update_rate: 200\n",
+      R"({"device_type": "D435i", "imus": [{"accelerometer": {"bias": [0.3, 0.2, 0.1], "scale_and_alignment": [1.1, 0.1, 0, 0, 1, 0, 0, 0, 1]}, "gyroscope": {"bias": [0.01, 0, -0.02], "scale_and_alignment": [1, 0, 0, 0, 1, 0, 0, 0, 1]}}]})",
+      "image_width: 8\nimage_height: 6\ncamera_name: left\ncamera_matrix: {rows: 3, cols: 3, data: [4, 0, 3, 0, 4, 2, 0, 0, 1]}\n"
+      "distortion_model: plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0, 0, 0, 0]}\n"
+      "rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
+      "projection_matrix: {rows: 3, cols: 4, data: [3.9, 0, 3, -0.4, 0, 3.9, 2, 0, 0, 0, 1, 0]}\n",
       "Gyr: {avg-axis: {gyr_n: 1, gyr_w: 1}}\nAcc: {avg-axis: {acc_n: 1, acc_w: 1}}\n"};
 }
 
@@ -228,6 +250,7 @@ void fuzz_foreign_calibration(std::string_view bytes) {
   require_sentence(parse_vins_fusion(yaml, {yaml}));
   require_sentence(parse_camera_info(yaml, yaml, {}));
   require(!camera_info_alone(yaml).message.empty());
+  require_sentence(parse_camera_info_file(yaml));
   require_sentence(parse_vins_mono(yaml));
   require_sentence(parse_orbslam(yaml));
   require_sentence(parse_kimera({yaml}, yaml));

@@ -9,6 +9,8 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/kitti_poses.hpp"
+#include "fbvins/io/known_file.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/png_encode.hpp"
@@ -18,6 +20,7 @@
 #include "fbvins/mocap/marker_test_files.hpp"
 #include "fbvins/mocap/motion_capture.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
+#include "tests/fuzz/named_file.hpp"
 #include "tests/fuzz/require.hpp"
 
 namespace fbvins::fuzz {
@@ -57,8 +60,21 @@ std::vector<std::string> trajectory_seeds() {
       "0 0 0 0\n",
       "#t x y z roll pitch yaw\n1.5 1 2 3 0 0 90\n2.5 1 2 3 0 0 -90\n",
       "1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n",
+      "1403636584763555584,1,2,3,1,0,0,0,0.1,0.2,0.3,\n1403636584813555584,1,2,3,1,0,0,0,0.1,0.2,0.3,\n",
+      "1403636584763555584.000000 1 2 3 0 0 0 1\n1403636584813555584.000000 1 2 3 0 0 0 1\n",
+      "7;1403636584763555;1;2;3;1;0;0;0\n8;1403636584813555;1;2;3;1;0;0;0\n",
       "4294.9,1,2,3,1,0,0,0\n4294.95,1,2,3,1,0,0,0\n0.1,1,2,3,1,0,0,0\n0.2,1,2,3,1,0,0,0\n"};
 }
+
+/// A row of each kind of file that other systems write.
+std::vector<std::string> known_file_seeds() {
+  return {trajectory_seeds()[1],
+             "%YAML:1.0\nimu_topic: /imu0\noutput_path: /tmp\nmax_cnt: 150\nmin_dist: 30\n", "1 0 0 0 0 1 0 0 0 0 1 0\n",
+              "{\"cameraData\": [], \"imuExtrinsics\": {}}", "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
+              std::string("PK\3\4\0\0", 6), "#ROSBAG V2.0\n", "\x89PNG\r\n", std::string("\x1f\x8b\0\0", 4), "SQLite format 3"};
+}
+
+std::vector<std::string> kitti_seeds() { return {"1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n1 0 0 5 0 1 0 6 0 0 1 9\n", "0.1\n0.2\n0.3\n"}; }
 
 std::vector<std::string> image_seeds() {
   return {test::make_png(1, {.width = 16, .height = 12}),
@@ -189,6 +205,25 @@ void fuzz_trajectory(std::string_view bytes) {
   for (const TrajectoryPoint& point : file->points) require_rigid(point.T_WB);
 }
 
+void fuzz_known_file(std::string_view bytes) {
+  static const NamedFile file("known");
+  if (const auto known = known_file(file.with(bytes))) require(!known->what.empty() && known->what.find('\n') == std::string::npos);
+}
+
+/// As poses with good times beside them, and as the times of good poses.
+void fuzz_kitti(std::string_view bytes) {
+  static const NamedFile times("kitti_times.txt");
+  const std::string name = times.with(kitti_seeds()[1]), path = name.substr(0, name.size() - 10) + ".txt", poses = kitti_seeds()[0];
+  (void)looks_like_kitti(bytes);
+  const auto as_poses = kitti_with_times(bytes, path);
+  require(as_poses.ok() || bytes != poses);
+  times.with(bytes);
+  for (const auto& done : {as_poses, kitti_with_times(poses, path)}) {
+    require_sentence(done);
+    if (done) require_sentence(parse_trajectory(done->tum, path));
+  }
+}
+
 void fuzz_image(std::string_view bytes) {
   const auto image = decode_image(bytes);
   require_sentence(image);
@@ -244,6 +279,10 @@ const std::vector<Target>& targets() {
       {"mcap", fuzz_mcap, mcap_seeds},
       {"motion_capture", fuzz_motion_capture, motion_capture_seeds},
       {"cdr", fuzz_cdr, cdr_seeds},
+      {"tags", fuzz_tags, tag_seeds},
+      {"board_files", fuzz_board_files, board_file_seeds},
+      {"known_file", fuzz_known_file, known_file_seeds},
+      {"kitti", fuzz_kitti, kitti_seeds},
 #ifdef FBVINS_WITH_LOOP
       {"map", fuzz_map, map_seeds},
       {"vocabulary", fuzz_vocabulary, vocabulary_seeds},

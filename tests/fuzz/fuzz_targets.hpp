@@ -18,6 +18,12 @@ void fuzz_mcap(std::string_view bytes);
 void fuzz_motion_capture(std::string_view bytes);
 void fuzz_cdr(std::string_view bytes);
 std::vector<std::string> cdr_seeds();
+void fuzz_tags(std::string_view bytes);
+std::vector<std::string> tag_seeds();
+void fuzz_board_files(std::string_view bytes);
+std::vector<std::string> board_file_seeds();
+void fuzz_known_file(std::string_view bytes);
+void fuzz_kitti(std::string_view bytes);
 #ifdef FBVINS_WITH_LOOP
 void fuzz_map(std::string_view bytes);
 std::vector<std::string> map_seeds();

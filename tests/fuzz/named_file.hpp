@@ -15,7 +15,7 @@ namespace fbvins::fuzz {
 class NamedFile {
  public:
   explicit NamedFile(std::string_view extension)
-      : path_((std::filesystem::temp_directory_path() / fmt::format("fbvins_fuzz_{}.{}", ::getpid(), extension)).string()) {}
+      : path_((folder() / fmt::format("fbvins_fuzz_{}.{}", ::getpid(), extension)).string()) {}
   ~NamedFile() {
     std::error_code ignored;
     std::filesystem::remove(path_, ignored);
@@ -29,6 +29,12 @@ class NamedFile {
   }
 
  private:
+  /// In memory, where there is such a folder: a file on a disk is written thousands of times.
+  static std::filesystem::path folder() {
+    std::error_code ignored;
+    return std::filesystem::is_directory("/dev/shm", ignored) ? "/dev/shm" : std::filesystem::temp_directory_path();
+  }
+
   std::string path_;
 };
 

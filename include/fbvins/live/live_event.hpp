@@ -47,6 +47,7 @@ struct LiveCounts {
   std::int64_t imu_late = 0;            ///< dropped: a later one had gone on before, or the stamp is one that no clock gives
   std::int64_t imu_reordered = 0;       ///< came late, and were put in order
   std::int64_t clock_leaps = 0;         ///< jumps of a sensor's clock, corrected
+  std::int64_t clock_set_back = 0;      ///< of these, back to a time that says nothing: the estimate began anew
   std::int64_t resets = 0;              ///< restarts of the estimator
   std::int64_t events_lost = 0;         ///< events that sinks did not get, as they were too slow
 
@@ -64,6 +65,7 @@ struct LiveCounts {
     f("imu_late", imu_late);
     f("imu_reordered", imu_reordered);
     f("clock_leaps", clock_leaps);
+    f("clock_set_back", clock_set_back);
     f("resets", resets);
     f("events_lost", events_lost);
   }

@@ -93,9 +93,10 @@ std::optional<BagCamera::Rectified> rectified(const Camera& raw, const InfoTail&
   BagCamera::Rectified out{Camera(PinholeRadtan{tail.P[0], tail.P[5], tail.P[2], tail.P[6]}, raw.width(), raw.height())};
   out.R_rectified_raw << tail.R[0], tail.R[1], tail.R[2], tail.R[3], tail.R[4], tail.R[5], tail.R[6], tail.R[7], tail.R[8];
   if (!((out.R_rectified_raw.transpose() * out.R_rectified_raw - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3) ||
-      !std::isfinite(tail.P[2]) || !std::isfinite(tail.P[6]) || !std::isfinite(tail.P[3]))
+      !std::isfinite(tail.P[0]) || !std::isfinite(tail.P[5]) || !std::isfinite(tail.P[2]) || !std::isfinite(tail.P[6]))
     return std::nullopt;
   out.x_m = -tail.P[3] / tail.P[0];
+  if (!std::isfinite(out.x_m)) return std::nullopt;
   const std::vector<double> k = raw.distortion();
   const bool same = raw.intrinsics() == out.camera.intrinsics() && raw.model_name() == "pinhole-radtan" &&
                     std::ranges::all_of(k, [](double x) { return x == 0; }) && out.R_rectified_raw == Mat3::Identity() && out.x_m == 0;

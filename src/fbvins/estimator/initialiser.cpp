@@ -170,10 +170,18 @@ std::vector<ImuSample> Initialiser::newest_readings() const {
   return readings;
 }
 
+/// What is a gap the segments say, as a slow IMU's own steps are none.
+RestOptions Initialiser::rest_options() const {
+  RestOptions options;
+  const auto has_gap = [&](const ImuSegment& s) { return s.longest_gap.seconds() > options.max_gap_s; };
+  if (std::ranges::none_of(readings_, has_gap)) options.max_gap_s = options.min_window_s;
+  return options;
+}
+
 /// While it stands the floor tells the accelerometer's bias, which is then known when the start comes.
 ImuBiasEstimate Initialiser::as_it_stands(const ImuBiasEstimate& prior, bool at_rest) {
   if (at_rest) {
-    const RestEstimate rest = initialise_at_rest(newest_readings(), noise_, RestOptions{}, gravity_mps2_);
+    const RestEstimate rest = initialise_at_rest(newest_readings(), noise_, rest_options(), gravity_mps2_);
     if (rest.at_rest) stood_ = standing_bias(prior, rest.force_mps2, *stand_, gravity_mps2_);
   }
   return stood_.value_or(prior);
@@ -182,7 +190,7 @@ ImuBiasEstimate Initialiser::as_it_stands(const ImuBiasEstimate& prior, bool at_
 std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimate& biases) {
   std::vector<ImuSample> readings = newest_readings();
   for (ImuSample& reading : readings) reading.accel_mps2 -= biases.bias.accel_mps2;
-  RestEstimate rest = initialise_at_rest(readings, noise_, RestOptions{}, gravity_mps2_);
+  RestEstimate rest = initialise_at_rest(readings, noise_, rest_options(), gravity_mps2_);
   if (!rest.at_rest) {
     reason_ = HealthReason::waiting_for_motion_or_rest;
     return std::nullopt;

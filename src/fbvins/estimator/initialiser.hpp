@@ -15,6 +15,7 @@
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/imu/standing_bias.hpp"
+#include "fbvins/imu/static_initialiser.hpp"
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
@@ -63,6 +64,7 @@ class Initialiser {
   void remember(const TrackedFrame& frame, bool at_rest);
   int usable_features(const TrackedFrame& frame, bool at_rest) const;
   std::vector<ImuSample> newest_readings() const;
+  RestOptions rest_options() const;
   ImuBiasEstimate as_it_stands(const ImuBiasEstimate& prior, bool at_rest);
   std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
   std::optional<InitialSolution> start_with_one_camera(const SpacedFrames& frames, const ImuBiasEstimate& biases,

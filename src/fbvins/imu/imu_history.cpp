@@ -6,6 +6,10 @@
 namespace fbvins {
 namespace {
 
+/// Of an IMU this slow a step of up to so many of its periods is regular, and counts as a gap that is bridged everywhere.
+constexpr Duration kSlow{20'000'000}, kSlowest{100'000'000}, kBridged{50'000'000};
+constexpr double kRegular_periods = 1.6;
+
 bool earlier(const ImuSample& sample, Time t) { return sample.t < t; }
 bool later(Time t, const ImuSample& sample) { return t < sample.t; }
 
@@ -32,7 +36,19 @@ bool ImuHistory::add(const ImuSample& reading) {
   }
   readings_.push_back(corrected(reading, axes_));
   readings_.back().t = reading.t - time_offset_;
+  if (readings_.size() > 1) note_period(readings_.back().t - readings_[readings_.size() - 2].t);
   return true;
+}
+
+/// The shortest one counts: a fast IMU that becomes slow in flight has gaps.
+void ImuHistory::note_period(Duration interval) {
+  period_.add(interval);
+  if (const std::optional<Duration> now = period_.median()) shortest_period_ = std::min(shortest_period_.value_or(*now), *now);
+}
+
+bool ImuHistory::is_own_step(Duration step) const {
+  return shortest_period_ && *shortest_period_ > kSlow && *shortest_period_ <= kSlowest &&
+         step.seconds() <= kRegular_periods * shortest_period_->seconds();
 }
 
 void ImuHistory::set_time_offset(Duration offset) {
@@ -74,7 +90,7 @@ ImuSample ImuHistory::at(Time t) const {
   if (after == readings_.end()) return held(readings_.back(), t);
   if (after->t == t || after == readings_.begin()) return held(*after, t);
   const ImuSample& before = *(after - 1);
-  if ((after->t - before.t).seconds() <= options_.longest_interpolation_s) return interpolated(before, *after, t);
+  if ((after->t - before.t).seconds() <= options_.longest_interpolation_s || is_own_step(after->t - before.t)) return interpolated(before, *after, t);
   return held(t - before.t <= after->t - t ? before : *after, t);
 }
 
@@ -85,7 +101,7 @@ Duration ImuHistory::longest_gap(Time from, Time to) const {
   if (readings_.back().t < to) longest = std::max(longest, to - readings_.back().t);
   for (std::size_t k = 1; k < readings_.size() && readings_[k - 1].t < to; ++k)
     if (readings_[k].t > from) longest = std::max(longest, readings_[k].t - readings_[k - 1].t);
-  return longest;
+  return is_own_step(longest) ? std::min(longest, kBridged) : longest;
 }
 
 }  // namespace fbvins

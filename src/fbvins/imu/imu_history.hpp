@@ -11,8 +11,10 @@
 // Threads: one owner. Memory: at most `capacity` readings; the oldest go first and are counted.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "fbvins/core/sample_period.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/imu/reading_judge.hpp"
 #include "fbvins/types/imu.hpp"
@@ -41,7 +43,8 @@ class ImuHistory {
 
   /// The readings in (from, to) with both ends interpolated. An end whose neighbours are far apart, or that has only one
   /// neighbour, holds the nearest value, and longest_gap says how far the readings touching [from, to] are apart, or how long
-  /// ago the last one was. Empty where the readings are missing, or unless from < to.
+  /// ago the last one was. Of an IMU that has never shown more than 50 readings a second a step of its own is no gap: it counts as
+  /// 50 ms at most, and ends are interpolated in it. Empty where the readings are missing, or unless from < to.
   ImuSegment between(Time from, Time to) const;
 
   /// Drops the readings that no segment from `t` on needs.
@@ -55,12 +58,16 @@ class ImuHistory {
  private:
   ImuSample at(Time t) const;
   Duration longest_gap(Time from, Time to) const;
+  void note_period(Duration interval);
+  bool is_own_step(Duration step) const;
 
   Duration time_offset_;
   ImuHistoryOptions options_;
   ReadingJudge judge_;
   ImuIntrinsics axes_;
   std::vector<ImuSample> readings_;  ///< on the images' clock, strictly increasing
+  SamplePeriod period_;
+  std::optional<Duration> shortest_period_;  ///< that it has shown
   int overflow_ = 0;
 };
 

@@ -54,6 +54,40 @@ TEST(ImuHistory, IsOnTheClockOfTheImages) {
   EXPECT_NEAR(segment.samples.back().gyro_radps.x(), 0.060, 1e-12);
 }
 
+/// Readings every `period_ms` until `to_ms`, of which `lacks` says which are missing.
+template <class Lacks>
+ImuHistory slow(int period_ms, int to_ms, const Lacks& lacks) {
+  ImuHistory history;
+  for (int t = 0; t <= to_ms; t += period_ms)
+    if (!lacks(t)) history.add(ramp(t));
+  return history;
+}
+constexpr auto kNothingLacks = [](int) { return false; };
+
+/// Its own steps are interpolated in, and no gap of more than 50 ms; a reading that is missing is.
+TEST(ImuHistory, TheStepsOfASlowImuAreNoGaps) {
+  for (const int period_ms : {25, 50, 62, 100}) {
+    const ImuHistory whole = slow(period_ms, 2000, kNothingLacks);
+    const ImuSegment segment = whole.between(ms(1010), ms(1020));
+    ASSERT_EQ(segment.samples.size(), 2u) << period_ms;
+    EXPECT_NEAR(segment.samples.front().gyro_radps.x(), 1.010, 1e-12) << "interpolated";
+    EXPECT_EQ(segment.longest_gap.ns, std::min(period_ms, 50) * 1'000'000);
+    const int missing = 20 * period_ms;
+    const ImuHistory broken = slow(period_ms, 3000, [&](int t) { return t == missing; });
+    EXPECT_EQ(broken.between(ms(missing - 1), ms(missing + 1)).longest_gap.ns, 2 * period_ms * 1'000'000) << period_ms;
+  }
+}
+
+TEST(ImuHistory, AFastImuThatBecomesSlowHasGaps) {
+  ImuHistory history = filled(0, 1000);
+  for (int t = 1050; t <= 4000; t += 50) history.add(ramp(t));
+  EXPECT_EQ(history.between(ms(3940), ms(3990)).longest_gap.ns, 50'000'000) << "as long as it is";
+  for (int t = 4060; t <= 8000; t += 60) history.add(ramp(t));
+  EXPECT_EQ(history.between(ms(7900), ms(7960)).longest_gap.ns, 60'000'000);
+  const ImuHistory too_slow = slow(120, 4000, kNothingLacks);
+  EXPECT_EQ(too_slow.between(ms(3000), ms(3100)).longest_gap.ns, 120'000'000);
+}
+
 TEST(ImuHistory, HoldsTheNearestValueInAGapAndReportsIt) {
   ImuHistory history = filled(0, 40);
   for (int t = 140; t <= 200; t += 5) history.add(ramp(t));

@@ -62,14 +62,15 @@ void Preintegration::reset(const ImuBias& bias) {
 void Preintegration::integrate(const ImuSegment& segment) {
   if (segment.empty()) return;
   assert((readings_.empty() || readings_.back().t == segment.samples.front().t) && "segments must be consecutive");
-  const double longest_regular_s = gap_model_.longest_regular_step / noise_.rate_hz;
+  const double longest_regular_s = std::min(gap_model_.longest_regular_step / noise_.rate_hz, gap_model_.longest_known_step_s);
   for (std::size_t k = 0; k < segment.samples.size(); ++k) {
     const ImuSample& s = segment.samples[k];
     if (k == 0 && !readings_.empty()) continue;
     const double dt = k == 0 ? 0.0 : (s.t - segment.samples[k - 1].t).seconds();
     // A step cut by an image stamp may be short and still lie in a long gap, whose length is longest_gap.
     const bool gap = dt > longest_regular_s;
-    push({s.t, s.gyro_radps, s.accel_mps2, gap ? std::max(dt, segment.longest_gap.seconds()) : 0.0, segment.noise});
+    const double gap_s = segment.longest_gap.ns > 0 ? segment.longest_gap.seconds() : dt;
+    push({s.t, s.gyro_radps, s.accel_mps2, gap ? gap_s : 0.0, segment.noise});
   }
 }
 

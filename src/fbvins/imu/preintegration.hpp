@@ -34,6 +34,7 @@ struct RepropagationThreshold {
 /// What is assumed of the signal where readings are missing (eq. P13).
 struct ImuGapModel {
   double longest_regular_step = 2.5;  ///< in sampling periods; a longer step is a gap
+  double longest_known_step_s = 0.03;  ///< so is this one of a slow IMU: what lies between its readings is not known
   double gyro_sigma_radps = 0.3;      ///< error of the mean rate over a long gap
   double accel_sigma_mps2 = 2.0;      ///< error of the mean specific force over a long gap
   double long_gap_s = 0.1;            ///< shorter gaps: sigmas scaled by (gap / long_gap)^2

@@ -204,6 +204,25 @@ TEST(Preintegration, MissingReadingsInflateTheCovariance) {
   EXPECT_GT(std::sqrt(c.covariance()(nav::v, nav::v)), 0.3);
 }
 
+/// Whatever rate is declared: what lies between the readings of a slow IMU is not known.
+TEST(Preintegration, ASlowImuKnowsLessThanItsNoiseSays) {
+  const auto sigma_v = [](double declared_hz, int step_ms) {
+    ImuNoise noise;
+    noise.rate_hz = declared_hz;
+    ImuSegment segment;
+    for (int t = 0; t <= 1000; t += step_ms)
+      segment.samples.push_back({Time{t * 1'000'000LL}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+    segment.longest_gap = Duration{step_ms * 1'000'000LL};
+    Preintegration whole(noise, {});
+    whole.integrate(segment);
+    return std::sqrt(whole.covariance()(nav::v, nav::v));
+  };
+  const double fast = sigma_v(200, 5);
+  EXPECT_NEAR(sigma_v(100, 10), fast, 0.01 * fast) << "white noise alone, whatever the rate";
+  EXPECT_GT(sigma_v(20, 50), 5 * fast);
+  EXPECT_NEAR(sigma_v(20, 50), sigma_v(200, 50), 1e-12);
+}
+
 TEST(Preintegration, AnEmptySegmentAddsNothing) {
   Preintegration p(ImuNoise{}, {});
   p.integrate({});

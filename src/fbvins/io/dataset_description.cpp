@@ -30,7 +30,7 @@ void warn_about_gap(const Intervals& intervals, const char* what, std::vector<st
 }
 
 /// Below the first the turns of a hand or a vehicle lie between two readings; below the second no estimate begins.
-constexpr double kFewest_hz = 50, kTooFew_hz = 22;
+constexpr double kFewest_hz = 50, kTooFew_hz = 10;
 /// Of a calibration's rate to the measured one.
 constexpr double kOtherRate = 1.5;
 
@@ -40,7 +40,7 @@ void warn_about_rate(double measured_hz, double declared_hz, std::vector<std::st
   warnings.push_back(fmt::format("IMU: {:.3g} readings a second{}, {}: set the sensor to 100 to 400 Hz", measured_hz,
                                  other ? fmt::format(" where {:.3g} are declared", declared_hz) : "",
                                  measured_hz < kTooFew_hz ? "too few for an estimate (`imu_gap`, `alignment_refused`)"
-                                                          : "between which the motion is hardly known"));
+                                                          : "between which the motion is hardly known, so that the covariance is larger"));
 }
 
 void describe_imu(const std::vector<ImuSample>& imu, double declared_hz, DatasetInfo& info) {

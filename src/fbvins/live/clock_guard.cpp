@@ -52,11 +52,14 @@ std::optional<ClockGuard::Event> ClockGuard::correct(Stream stream, Time raw, Ti
   State& s = states_[stream];
   if (!s.newest) return begin(stream, raw, host);
   int held_back = 0;
+  Duration set_back{};
   if (!fits(s, raw + s.correction, host) || continues(s.misfits, raw, host)) {
     if (!go_on_as_a_clock(s.misfits, raw, host)) return std::nullopt;
     const Duration before = s.correction;
-    s.correction = correction_after_jump(stream, raw, host);
+    const Jump jump = jump_of(stream, raw, host);
+    s.correction = jump.correction;
     s.correction_before = before;
+    if (!jump.known && s.correction > before) set_back = s.correction - before;
     s.jumped_host = host;
     ++jumps_;
     held_back = s.misfits.count - 1;
@@ -68,7 +71,7 @@ std::optional<ClockGuard::Event> ClockGuard::correct(Stream stream, Time raw, Ti
   s.early = 0;
   const Time t = raw + s.correction;
   learn(s, t, host);
-  return Event{t, held_back};
+  return Event{.t = t, .held_back = held_back, .set_back = set_back};
 }
 
 /// The first stamps may be wrong, too: a stream begins when one is in step with the one before, or with the other stream.
@@ -123,7 +126,7 @@ bool ClockGuard::go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const {
 /// Puts the stamp a whole number of periods after the stream's newest one, by the time that has passed; or the other stream's
 /// correction, where that has jumped just now by about the same; or a counter's wrap; or the correction of before, where the
 /// clock jumped back.
-Duration ClockGuard::correction_after_jump(Stream stream, Time raw, Time host) const {
+ClockGuard::Jump ClockGuard::jump_of(Stream stream, Time raw, Time host) const {
   const State &s = states_[stream], &other = states_[1 - stream];
   const double passed_s = (host - *s.newest_host).seconds() * rate_;
   const double period_s = s.period.median().value_or(Duration::from_seconds(std::max(passed_s, 1e-3))).seconds();
@@ -131,9 +134,9 @@ Duration ClockGuard::correction_after_jump(Stream stream, Time raw, Time host) c
   const Duration own = *s.newest + Duration::from_seconds(steps * period_s) - raw;
   const bool other_jumped = (host - other.jumped_host).seconds() < kSameJumpWithin_s;
   const auto about = [&](Duration d) { return std::abs((own - d).seconds()) < kSameJump_s; };
-  if (other_jumped && about(other.correction)) return other.correction;
-  if (const Duration wrapped = s.correction + kWrap; about(wrapped)) return wrapped;
-  return about(s.correction_before) ? s.correction_before : own;
+  if (other_jumped && about(other.correction)) return {other.correction, true};
+  if (const Duration wrapped = s.correction + kWrap; about(wrapped)) return {wrapped, true};
+  return about(s.correction_before) ? Jump{s.correction_before, true} : Jump{own, false};
 }
 
 void ClockGuard::learn(State& s, Time t, Time host) {

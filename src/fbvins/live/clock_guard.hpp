@@ -3,7 +3,8 @@
 // sets the time), stamps are shifted so that they continue where they were. A stamp far before the newest one, or ahead of any
 // possible arrival, does not fit. Events that do not fit are a jump only if they go on for a while at the clock's own pace, with
 // none between them that fits; otherwise they are late, or their stamps wrong, and the clock is left alone. Data that are
-// merely late by some constant, bunched or missing fit. A stream begins with the first two stamps that are in step, and a stamp
+// merely late by some constant, bunched or missing fit. After a clock was set back its stamps say nothing of the time that has
+// passed: they are continued by this machine's clock, to a period, and the event says so, once for both streams. A stream begins with the first two stamps that are in step, and a stamp
 // that is earlier than its stream has been delivered so far counts when two more are.
 //
 //   if (auto event = guard.correct(ClockGuard::camera, frame.t, host_now))   // event->t is frame.t as long as no clock jumps
@@ -33,6 +34,7 @@ class ClockGuard {
     int held_back =
         0;  ///< so many events of the stream that were refused just before it are good, with the stamps of `corrected`
     bool other_too = false;  ///< and so is the last one of the other stream, which had not begun
+    Duration set_back{};     ///< more than 0: the clock was set back by so much, and these events are the first ones since
   };
   /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any jump. Nothing where it does not
   /// fit: the event is of no use, unless the next ones say so.
@@ -81,7 +83,11 @@ class ClockGuard {
   bool fits(const State& s, Time t, Time host) const;
   bool continues(const Misfits& misfits, Time raw, Time host) const;
   bool go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const;
-  Duration correction_after_jump(Stream stream, Time raw, Time host) const;
+  struct Jump {
+    Duration correction;
+    bool known;  ///< a counter's wrap, the clock of before, or the other stream's jump
+  };
+  Jump jump_of(Stream stream, Time raw, Time host) const;
   void learn(State& s, Time t, Time host);
   double lateness_s(Time t, Time host) const;
   double shortest_lateness_s() const;

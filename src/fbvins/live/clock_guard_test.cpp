@@ -254,6 +254,44 @@ TEST(ClockGuard, ACounterThatWrapsIsContinuedExactly) {
   EXPECT_EQ(last->t.ns, true_ns);
 }
 
+/// How often a stream says that the clock was set back, and by how much the last time.
+struct SetBack {
+  int times = 0;
+  double by_s = 0;
+};
+template <class Jump>
+SetBack set_back(const Jump& jump, double camera_first_s = 0) {
+  ClockGuard guard(1);
+  SetBack out;
+  for (int k = 0; k < 6000; ++k) {
+    const double s = k * 0.005;
+    const auto give = [&](ClockGuard::Stream stream, double when_s) {
+      const auto event = guard.correct(stream, at(1000 + when_s + jump(when_s)), at(50.001 + when_s));
+      if (event && event->set_back.ns > 0) ++out.times, out.by_s = event->set_back.seconds();
+    };
+    if (k % 10 == 0) give(ClockGuard::camera, s - camera_first_s);
+    give(ClockGuard::imu, s);
+  }
+  return out;
+}
+
+TEST(ClockGuard, AClockThatIsSetBackSaysSoOnceForBothStreams) {
+  for (const double size_s : {0.12, 0.3, 1.0, 999.0})
+    for (const double camera_first_s : {0.0, 0.002}) {
+      const SetBack said = set_back([&](double s) { return s > 10 ? -size_s : 0.0; }, camera_first_s);
+      EXPECT_EQ(said.times, 1) << size_s;
+      EXPECT_NEAR(said.by_s, size_s, 0.006) << size_s;
+    }
+  EXPECT_EQ(set_back([](double s) { return s > 20 ? -2.0 : s > 10 ? -1.0 : 0.0; }).times, 2);
+}
+
+/// Where time has gone is known: it has leapt ahead, or is again what it was, or a counter has wrapped.
+TEST(ClockGuard, AClockThatLeapsAheadAndReturnsIsNotSetBack) {
+  EXPECT_EQ(set_back([](double s) { return s > 10 ? 3.0 : 0.0; }).times, 0);
+  EXPECT_EQ(set_back([](double s) { return s > 10 && s < 20 ? 3.0 : 0.0; }).times, 0);
+  EXPECT_EQ(set_back([](double s) { return s > 10 ? -4294.967296 : 0.0; }).times, 0);
+}
+
 TEST(ClockGuard, SaysWhenAStampWasOnThisMachine) {
   ClockGuard guard(1);
   double worst_s = 0;

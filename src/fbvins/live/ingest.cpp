@@ -46,6 +46,7 @@ void Ingest::push(const ImuSample& sample) {
     ++counts_.imu_late;
     return;
   }
+  note_clock(*event, host);
   const std::size_t lost = misfits_.size() - std::min(misfits_.size(), static_cast<std::size_t>(event->held_back));
   counts_.imu_late += static_cast<std::int64_t>(lost);
   for (std::size_t k = lost; k < misfits_.size(); ++k)
@@ -56,6 +57,14 @@ void Ingest::push(const ImuSample& sample) {
     take(*std::exchange(held_image_, std::nullopt), t, host);
   }
   put_in_order(sample, event->t, host);
+}
+
+/// Both streams may tell of it; the mark is for the next image.
+void Ingest::note_clock(const ClockGuard::Event& event, Time host) {
+  if (event.set_back.ns <= 0) return;
+  after_clock_step_ = true;
+  ++counts_.clock_set_back;
+  arrivals_.set_back_at = host, arrivals_.set_back = event.set_back;
 }
 
 /// `t`: the reading's stamp on the images' clock, corrected.
@@ -79,6 +88,7 @@ void Ingest::push(StereoFrame frame) {
     else held_image_ = std::move(frame);
     return;
   }
+  note_clock(*event, host);
   if (event->other_too && !misfits_.empty()) {
     put_in_order(misfits_.back(), clock_.corrected(ClockGuard::imu, misfits_.back().t - time_offset_), host);
     misfits_.pop_back();

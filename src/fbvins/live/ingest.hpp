@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Queue from the sensors' threads to one consumer. Corrects stamps after clock jumps, puts IMU readings in order, refuses those
+// Queue from the sensors' threads to one consumer. Corrects stamps after clock jumps, marks the first image after a clock was set
+// back (StereoFrame::after_clock_step), with which the estimate begins anew, puts IMU readings in order, refuses those
 // that the sensor cannot have made, removes frozen images, and keeps one image waiting at most: when the next comes, the older
 // one is dropped and counted. No good reading ever is.
 //
@@ -59,6 +60,8 @@ class Ingest final : public SensorInput {
     std::vector<Camera> cameras;           ///< of the rig, by number
     Time newest;                           ///< stamp, on the images' clock
     std::optional<Duration> image_period;  ///< of the frames' stamps
+    std::optional<Time> set_back_at;       ///< when a clock was found to be set back, the last time, on this machine's clock
+    Duration set_back;                     ///< by how much
   };
   Arrival arrivals() const;
   /// A stamp of the images' clock on this machine's clock (ClockGuard::host_of).
@@ -67,6 +70,7 @@ class Ingest final : public SensorInput {
   LiveCounts counts() const;
 
  private:
+  void note_clock(const ClockGuard::Event& event, Time host);
   void put_in_order(ImuSample sample, Time t, Time host);
   void release(const ImuSample& sample);
   void take(StereoFrame frame, Time t, Time host);

@@ -230,6 +230,28 @@ TEST(Ingest, NoReadingIsLostWhenTheClockJumps) {
   for (std::size_t k = 0; k < f.told.size(); ++k) EXPECT_EQ(f.told[k], ms(5 * static_cast<std::int64_t>(k)));
 }
 
+/// After a clock was set back the estimate begins anew with one image, and no image of before has the mark.
+TEST(Ingest, TheFirstImageAfterAClockWasSetBackSaysSo) {
+  for (const std::int64_t offset_ms : {0, 2}) {  // the camera's stamp is the first one, or the IMU's
+    Fixture f;
+    std::vector<Time> marked;
+    for (std::int64_t t = 0; t < 4000; t += 1) {
+      const std::int64_t back = t < 2000 ? 0 : 1000;
+      f.now = ms(1000 + t);
+      if (t % 50 == offset_ms) f.ingest.push(StereoFrame{ms(t - back), image(static_cast<std::uint8_t>(t / 50)), image(255)});
+      if (t % 5 == 0) f.ingest.push(reading(t - back));
+      while (const auto event = f.ingest.pop_waiting())
+        if (const auto* frame = std::get_if<StereoFrame>(&*event); frame && frame->after_clock_step) marked.push_back(frame->t);
+    }
+    ASSERT_EQ(marked.size(), 1u) << offset_ms;
+    EXPECT_GE(marked[0], ms(2250));
+    EXPECT_LE(marked[0], ms(2310));
+    EXPECT_EQ(f.ingest.counts().clock_leaps, 2);
+    EXPECT_EQ(f.ingest.counts().clock_set_back, 1);
+    EXPECT_EQ(f.ingest.arrivals().set_back, Duration{1'000'000'000});
+  }
+}
+
 TEST(Ingest, ReadingsThatTheSensorCannotHaveMadeAreSilence) {
   Fixture f;
   for (std::int64_t t = 0; t < 1000; t += 5) {

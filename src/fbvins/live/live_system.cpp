@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/live_system.hpp"
 
+#include <fmt/format.h>
+
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -18,6 +20,8 @@ namespace {
 
 constexpr Duration kWatchPeriod = Duration::from_seconds(0.02);
 constexpr Duration kStatusPeriod = Duration::from_seconds(1);
+/// So long the status speaks of a clock that was set back.
+constexpr Duration kToldFor = Duration::from_seconds(5);
 
 }  // namespace
 
@@ -114,7 +118,8 @@ struct LiveSystem::Impl {
 
   LiveStatus status() {
     LiveStatus s;
-    s.t = ingest.arrivals().newest;
+    const Ingest::Arrival arrivals = ingest.arrivals();
+    s.t = arrivals.newest;
     s.host_t = host_now();
     s.counts = ingest.counts();
     s.counts.keyframes_left_out = system.keyframes_left_out();
@@ -126,6 +131,8 @@ struct LiveSystem::Impl {
       if (!problem.empty()) s.problem = report.name + ": " + problem;
       if (!report.figures.empty()) s.outputs.push_back({report.name, report.figures});
     }
+    if (arrivals.set_back_at && s.host_t - *arrivals.set_back_at < kToldFor)
+      s.problem = fmt::format("the sensors' clock was set back by {:.3f} s, or began again: the estimate begins anew", arrivals.set_back.seconds());
     if (const Result<void> state = system.status(); !state) s.problem = state.error().message;
     return s;
   }

@@ -132,6 +132,7 @@ std::optional<LiveStatus> status_of(const RosDiagnostic& diagnostic) {
                             {"imu_late", &c.imu_late},
                             {"imu_reordered", &c.imu_reordered},
                             {"clock_leaps", &c.clock_leaps},
+                            {"clock_set_back", &c.clock_set_back},
                             {"resets", &c.resets},
                             {"events_lost", &c.events_lost}})
     take_number(diagnostic, key, *count);
