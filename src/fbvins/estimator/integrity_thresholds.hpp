@@ -3,10 +3,10 @@
 // stands what flights without a fault ("clean") have, so how far away a false alarm is, and on which data. Numbers (I..) are
 // those of docs/derivations/integrity.md.
 //
-//   A  27 flights, 54 runs, 24,704 images after the start: 0 images degraded, 0 resets (docs/experiments/integrity.md,
-//      "Twenty-seven flights without a fault"). At 20 images a second these are 21 minutes: with 95 % all tests together have
-//      less than nine false alarms an hour. No clean data here are long enough to say less.
-//   B  20 runs, 9,665 images: 0 alarms of every test (the same page, "False alarms of each test").
+// - A: 27 flights, 54 runs, 24,704 images after the start: 0 images degraded, 0 resets (docs/experiments/integrity.md,
+//   "Twenty-seven flights without a fault"). At 20 images a second these are 21 minutes: with 95 % all tests together have
+//   less than nine false alarms an hour. No clean data here are long enough to say less.
+// - B: 20 runs, 9,665 images: 0 alarms of every test (the same page, "False alarms of each test").
 //
 // What no data was set on is marked as chosen.
 #pragma once
