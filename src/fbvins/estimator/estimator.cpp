@@ -13,6 +13,7 @@
 #include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/estimator/mono_start.hpp"
 #include "fbvins/estimator/window_views.hpp"
+#include "fbvins/imu/stamp_noise.hpp"
 #include "fbvins/types/protection.hpp"
 
 namespace fbvins {
@@ -23,9 +24,6 @@ using namespace thresholds;
 constexpr double kRestForStandstill_s = 0.5;
 /// Share by which an accelerometer's axes and scale are off, of a sensor that was not calibrated up to twice as much.
 constexpr double kAxes = 0.015;
-/// Noise of one camera's stamps, whatever its tracks show of it: with one camera the readings alone give the scale, and stamps that are
-/// taken to be exact spoil it. As real images without such noise have (docs/derivations/gyro_alignment.md, Y8).
-constexpr double kStampOfOneCamera_s = 0.0007;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.15;
 /// Likewise: 5 % of right ones are refused, and tried again with the next image (chi-square, three numbers).
@@ -191,9 +189,10 @@ Frame Estimator::predict(const TrackedFrame& frame, const ImuSegment& readings) 
   Preintegration imu(imu_noise_, last.state.bias);
   imu.integrate(readings);
   f.state = imu.predict(last.state, gravity_G());
+  // With one camera the readings alone give the scale, and stamps that are taken to be exact spoil it.
   const bool velocity_known = frames_with_readings_ >= kFramesAfterGap;
   if (one_camera_ && velocity_known && !frame.features.empty())
-    imu.loosen_end(std::sqrt(2.0) * kStampOfOneCamera_s, f.state, gravity_G());
+    imu.loosen_end(std::sqrt(2.0) * kUnseenStampNoise_s, f.state, gravity_G());
   f.imu = std::make_shared<const Preintegration>(std::move(imu));
   return f;
 }
@@ -205,7 +204,10 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   const Duration dt = frame.t - window_.newest().t;
   ImuSegment imu = frame.imu;
   imu.noise = reading_noise_.of(imu);
-  if (!frame.features.empty()) add_stamp_noise(imu);
+  if (!frame.features.empty()) {
+    const NavState<G>& last = window_.newest().state;
+    add_stamp_noise(imu, imu_noise_, time_alignment_.stamp_sigma_s(), last_rate_ - last.bias.gyro_radps, last.v_FB);
+  }
   Frame predicted = predict(frame, imu);
   const std::vector<TrackedFeature> features = check_readings(frame, imu, predicted);
   out.imu_noise = imu.noise;
@@ -226,18 +228,6 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   out.odometry.health = judge(frame, out.odometry);
   if (out.odometry.health.has_pose()) shrink_window(solution, out);
   stats.marginalise_ms = timer.lap_ms();
-}
-
-/// Between images whose stamps have noise of their own the readings turn and move by as much more or less (Y8).
-void Estimator::add_stamp_noise(ImuSegment& imu) const {
-  const double sigma_s = std::sqrt(2.0) * time_alignment_.stamp_sigma_s();
-  if (imu.empty() || sigma_s == 0) return;
-  const double dt = (imu.samples.back().t - imu.samples.front().t).seconds();
-  const NavState<G>& last = window_.newest().state;
-  const double turn = sigma_s * (last_rate_ - last.bias.gyro_radps).norm(), shift = sigma_s * last.v_FB.norm();
-  imu.noise.gyro = std::hypot(imu.noise.gyro, turn / (imu_noise_.gyro_noise_density_radps_rthz * std::sqrt(dt)));
-  imu.noise.accel =
-      std::hypot(imu.noise.accel, shift / (imu_noise_.accel_noise_density_mps2_rthz * std::sqrt(dt * dt * dt / 3)));
 }
 
 /// Compares images and readings, and returns the features of the cameras that agree. Readings that the images

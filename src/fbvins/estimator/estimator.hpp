@@ -69,7 +69,6 @@ class Estimator {
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
   TrackedFrame refer_to_stamp(const TrackedFrame& frame) const;
   Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
-  void add_stamp_noise(ImuSegment& imu) const;
   std::vector<TrackedFeature> check_readings(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
   void fill_covariances(const WindowSolution& solution, Odometry& out);

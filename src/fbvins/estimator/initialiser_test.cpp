@@ -63,7 +63,9 @@ TEST(SpacedFrames, HoldTheNewestWithTheReadingsBetweenThem) {
     const TrackedFrame &before = frames.all()[i - 1], &frame = frames.all()[i];
     EXPECT_EQ(frame.imu.samples.front().t, before.t);
     EXPECT_EQ(frame.imu.samples.back().t, frame.t);
-    if (i + 1 < frames.all().size()) EXPECT_NEAR((frame.t - before.t).seconds(), 0.1, 1e-6);
+    if (i + 1 < frames.all().size()) {
+      EXPECT_NEAR((frame.t - before.t).seconds(), 0.1, 1e-6);
+    }
   }
 }
 

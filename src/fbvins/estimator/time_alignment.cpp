@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/imu/stamp_noise.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -20,15 +22,13 @@ constexpr int kInARow = 3, kSolvesOfNoise = 20;
 constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma = 2.5;
 /// In flight the correction is made in steps: a pose must not lie before the one before it.
 constexpr Duration kStep{4'000'000};
-/// Noise of stamps below this is not told from none where tracks are few, and harms less than readings that count for less.
-constexpr double kNoJitter_s = 0.0007;
 /// The gyroscope's bias is taken from tracks that fit turns to this many of their standard deviations. Where things are close and
 /// the camera moves, its standard deviation is too small by up to the second (docs/experiments/sensors.md).
 constexpr double kFitsTurns_rms = 1, kBiasShared = 2;
 /// Drivers keep their delay from flight to flight to this, at best.
 constexpr double kKept_s = 0.005;
 
-/// Beyond the rig's. More than can be found is not believed.
+/// Beyond the rig's. More than can be found is not used.
 std::optional<TimeOffsetEstimate> correction_of(const std::optional<TimeOffsetEstimate>& kept, const StereoRig& rig) {
   if (!kept) return kept;
   const TimeOffsetEstimate beyond{kept->s - rig.time_offset_s, std::hypot(kept->sigma_s, kKept_s)};
@@ -95,7 +95,7 @@ double TimeAlignment::off_sigmas(const Vec3& gyro_bias_radps, const Mat3& covari
 }
 
 double TimeAlignment::stamp_sigma_s() const {
-  const double jitter_s = std::sqrt(std::max(0.0, jitter_s_ * jitter_s_ - kNoJitter_s * kNoJitter_s));
+  const double jitter_s = std::sqrt(std::max(0.0, jitter_s_ * jitter_s_ - kUnseenStampNoise_s * kUnseenStampNoise_s));
   return std::hypot(jitter_s, settling() ? std::max(0.002, std::abs((found_ - correction_).seconds())) : 0.0);
 }
 

@@ -35,4 +35,13 @@ double stamp_sigma_s(const std::vector<LateImage>& late) {
   return std::sqrt(std::max(0.0, surely * sigma * sigma - usual * usual - median(known_s2)) / 6);
 }
 
+void add_stamp_noise(ImuSegment& imu, const ImuNoise& noise, double stamp_sigma_s, const Vec3& rate_radps, const Vec3& velocity_mps) {
+  const double sigma_s = std::sqrt(2.0) * stamp_sigma_s;
+  if (imu.empty() || sigma_s == 0) return;
+  const double dt = (imu.samples.back().t - imu.samples.front().t).seconds();
+  const double turn = sigma_s * rate_radps.norm(), shift = sigma_s * velocity_mps.norm();
+  imu.noise.gyro = std::hypot(imu.noise.gyro, turn / (noise.gyro_noise_density_radps_rthz * std::sqrt(dt)));
+  imu.noise.accel = std::hypot(imu.noise.accel, shift / (noise.accel_noise_density_mps2_rthz * std::sqrt(dt * dt * dt / 3)));
+}
+
 }  // namespace fbvins
