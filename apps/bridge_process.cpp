@@ -21,9 +21,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int kPollMs = 200, kSilentPolls = 5;  ///< so long a last word waits, as it may be the reason of an end
-constexpr auto kLetItEnd = 2s;              ///< between SIGTERM and SIGKILL
-constexpr auto kAgainAfter = 1s;            ///< between a failure and the next start
-constexpr auto kLastDataWithin = 500ms;        ///< what a program sent before it ended regularly is still being read
+constexpr auto kLetItEnd = 2s;           ///< between SIGTERM and SIGKILL
+constexpr auto kAgainAfter = 1s;         ///< between a failure and the next start
+constexpr auto kLastDataWithin = 500ms;  ///< what a program sent before it ended regularly is still being read
 constexpr std::size_t kLongestLine = 2000;  ///< what is longer is cut into several
 
 /// After fork(): only what signal-safety(7) allows.
@@ -161,7 +161,8 @@ bool BridgeProcess::run_once(Result<void>& ended) {
   const std::string why = words.reason();
   ended = {};
   if (came_ && WIFEXITED(status) && WEXITSTATUS(status) == 0) return false;
-  ended = Error{ErrorCode::unreadable, fmt::format("{}: {}", command_.name, why.empty() ? "its program has ended (" + how(status) + ")" : why)};
+  ended = Error{ErrorCode::unreadable,
+                fmt::format("{}: {}", command_.name, why.empty() ? "its program has ended (" + how(status) + ")" : why)};
   return true;
 }
 
@@ -173,7 +174,7 @@ pid_t BridgeProcess::start(int output) const {
       fmt::format("{} cannot be started: install Python 3, or name it by FBVINS_PYTHON\n", command_.arguments.front());
   const pid_t parent = getpid(), child = fork();
   if (child == 0) become(arguments.data(), output, parent, not_found);
-  setpgid(child, child);  // whoever of both is first: terminate() ends the group
+  setpgid(child, child);  // as the child does itself: terminate() needs the group whichever of the two runs first
   return child;
 }
 

@@ -51,7 +51,7 @@ inline constexpr double kOther = 0.5, kReadmitted_s = 1;
 /// A contradiction is over after so long without one; with images to compare missing for so long meanwhile it is hopeless.
 /// Chosen.
 inline constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
-/// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is. Chosen.
+/// After darkness of this length the velocity is unknown, and the first predictions are as wrong as it is. Chosen.
 inline constexpr double kDark_s = 0.15;
 inline constexpr int kSettling = 5;  ///< images
 /// Two resets within a few seconds are no way to fly. Chosen. A: no reset at all.

@@ -90,7 +90,8 @@ ImuSample ImuHistory::at(Time t) const {
   if (after == readings_.end()) return held(readings_.back(), t);
   if (after->t == t || after == readings_.begin()) return held(*after, t);
   const ImuSample& before = *(after - 1);
-  if ((after->t - before.t).seconds() <= options_.longest_interpolation_s || is_own_step(after->t - before.t)) return interpolated(before, *after, t);
+  if ((after->t - before.t).seconds() <= options_.longest_interpolation_s || is_own_step(after->t - before.t))
+    return interpolated(before, *after, t);
   return held(t - before.t <= after->t - t ? before : *after, t);
 }
 

@@ -128,7 +128,7 @@ class Preintegration {
   std::vector<Reading> readings_;
   ImuDeltas deltas_;
   Mat3 J_theta_bg_, J_v_bg_, J_v_ba_, J_p_bg_, J_p_ba_;
-  Mat15 covariance_;                ///< without the end's
+  Mat15 covariance_;  ///< without the end's
   Vec3 end_p_ = Vec3::Zero(), end_theta_ = Vec3::Zero(), end_v_ = Vec3::Zero();  ///< loosen_end()'s standard deviation, in B_j
   double longest_gap_s_ = 0;
   mutable Mat15 sqrt_information_;

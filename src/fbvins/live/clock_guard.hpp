@@ -4,8 +4,9 @@
 // possible arrival, does not fit. Events that do not fit are a jump only if they go on for a while at the clock's own pace, with
 // none between them that fits; otherwise they are late, or their stamps wrong, and the clock is left alone. Data that are
 // merely late by some constant, bunched or missing fit. After a clock was set back its stamps say nothing of the time that has
-// passed: they are continued by this machine's clock, to a period, and the event says so, once for both streams. A stream begins with the first two stamps that are in step, and a stamp
-// that is earlier than its stream has been delivered so far counts when two more are.
+// passed: they are continued by this machine's clock, to a period, and the event reports it, once for both streams. A stream
+// begins with the first two stamps that are in step, and a stamp that is earlier than its stream has been delivered so far counts
+// when two more are.
 //
 //   if (auto event = guard.correct(ClockGuard::camera, frame.t, host_now))   // event->t is frame.t as long as no clock jumps
 //     Time shutter = guard.host_of(event->t);                            // when that was on this machine's clock

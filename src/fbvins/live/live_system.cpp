@@ -132,7 +132,8 @@ struct LiveSystem::Impl {
       if (!report.figures.empty()) s.outputs.push_back({report.name, report.figures});
     }
     if (arrivals.set_back_at && s.host_t - *arrivals.set_back_at < kToldFor)
-      s.problem = fmt::format("the sensors' clock was set back by {:.3f} s, or began again: the estimate begins anew", arrivals.set_back.seconds());
+      s.problem = fmt::format("the sensors' clock was set back by {:.3f} s, or began again: the estimate begins anew",
+                              arrivals.set_back.seconds());
     if (const Result<void> state = system.status(); !state) s.problem = state.error().message;
     return s;
   }
