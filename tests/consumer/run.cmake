@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# cmake -DBUILD=<build folder> -DSOURCE=<tests/consumer> -DCXX=<compiler> -DTUTORIAL=<file> -DFBVINS=<program> -P run.cmake
+# cmake -DBUILD=<build folder> -DSOURCE=<tests/consumer> -DCXX=<compiler> -DTUTORIAL=<file> -DEXAMPLES=<examples> -DFBVINS=<program> -P run.cmake
 # For another architecture also -DTOOLCHAIN=<file> -DSYSROOT=<folder> -DEMULATOR=<program and arguments>.
 # Installs into a fresh prefix, then configures, builds and runs users' projects against it alone.
 set(folder ${BUILD}/consumer)
@@ -52,7 +52,19 @@ if(TOOLCHAIN)
   return()  # the rest is the same on every architecture, and slow under emulation
 endif()
 
+# A frontend in a plugin (examples/own_frontend).
+step(${CMAKE_COMMAND} -S ${EXAMPLES}/own_frontend -B ${folder}/own_frontend -G Ninja -DCMAKE_CXX_COMPILER=${CXX} ${installed} ${hidden})
+step(${CMAKE_COMMAND} --build ${folder}/own_frontend)
+step(${FBVINS} simulate normal --seconds 4 --seed 1 --out ${folder}/flight --quiet)
+step(${FBVINS} run ${folder}/flight --plugin ${folder}/own_frontend/libown_frontend.so --frontend blocks --out ${folder}/blocks --quiet)
+file(READ ${folder}/blocks/summary.json summary)
+string(JSON error_m GET ${summary} result accuracy ape_m rmse)
+string(JSON coverage GET ${summary} result coverage share)
+if(error_m GREATER 0.05 OR coverage LESS 0.7)
+  message(FATAL_ERROR "the frontend of examples/own_frontend: an error of ${error_m} m at a coverage of ${coverage}")
+endif()
+message(STATUS "blocks: ${error_m} m, coverage ${coverage}")
+
 # Recordings and maps, by the lines of the tutorial.
 build(recording)
-step(${FBVINS} simulate normal --seconds 4 --seed 1 --out ${folder}/flight --quiet)
 step(${folder}/recording/consumer ${folder}/flight ${folder}/flat.fbm)

@@ -26,6 +26,10 @@ class Frontend {
   /// that follows them; one that comes twice counts once. For frontends that re-observe landmarks under their old track; others
   /// ignore the positions.
   virtual void locate(const LandmarkUpdate& update) { (void)update; }
+
+  /// How many features it may follow from the next image on, never more than it was made for: its share of a rig's, of which
+  /// other cameras use less at times. One that ignores it costs more time.
+  virtual void follow_at_most(int features) { (void)features; }
 };
 
 }  // namespace fbvins

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frontends by name. A new frontend is one line in the table of frontend_options.cpp, and a group below where it has
-// options; programs and configuration files ask for the names.
+// The frontends by name. A new one of the library is one line in the table of frontend_options.cpp, and a group below where it has
+// options; one of your own is registered (frontend_registry.hpp). Programs and configuration files ask for the names.
 //
 //   for (const std::string& name : frontend_names()) offer(name);
 //   Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, options);     // or make_frontend(rig, "orb")
@@ -19,14 +19,14 @@
 
 namespace fbvins {
 
-/// All frontends, the cheapest first.
+/// All frontends, the library's first, of these the cheapest first.
 std::vector<std::string> frontend_names();
 /// The one that is used if none is named.
 std::string default_frontend();
 /// The names as the choices of an option: "klt|orb|boost".
-const std::string& frontend_choices();
+std::string frontend_choices();
 /// One line about all of them, for the help of that option.
-const std::string& frontend_meanings();
+std::string frontend_meanings();
 
 /// The boost frontend is the orb frontend, with its options, and a network that improves descriptors.
 struct BoostFrontendOptions {
@@ -43,6 +43,7 @@ struct FrontendOptions {
   KltFrontendOptions klt;
   OrbFrontendOptions orb;
   BoostFrontendOptions boost;
+  std::string own;  ///< for a registered one, in whatever form it reads
 
   template <class V>
   void visit(V&& v) {
@@ -50,6 +51,7 @@ struct FrontendOptions {
     v.group("klt", klt, "the klt frontend");
     v.group("orb", orb, "the orb frontend");
     v.group("boost", boost, "the boost frontend, in addition to the orb frontend's options");
+    v("own", own, "", "what a frontend of a plugin is told, in its own form");
   }
 };
 

@@ -18,7 +18,7 @@ namespace fbvins {
 /// The rig with left and right exchanged.
 StereoRig mirrored(const StereoRig& rig);
 
-class EitherCamera final : public SharingFrontend {
+class EitherCamera final : public Frontend {
  public:
   /// `right`: for the mirrored rig.
   EitherCamera(const StereoRig& rig, std::unique_ptr<LeadingFrontend> left, std::unique_ptr<LeadingFrontend> right);

@@ -5,14 +5,15 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <iterator>
-#include <string_view>
+#include <cctype>
+#include <utility>
 
+#include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/features/booster.hpp"
-#include "fbvins/frontend/either_camera.hpp"
+#include "fbvins/frontend/for_each_group.hpp"
+#include "fbvins/frontend/frontend_registry.hpp"
 #include "fbvins/frontend/klt_frontend.hpp"
 #include "fbvins/frontend/orb_frontend.hpp"
-#include "fbvins/frontend/rig_frontend.hpp"
 
 namespace fbvins {
 namespace {
@@ -28,32 +29,20 @@ Options shared_by(Options options, std::size_t groups) {
   return options;
 }
 
-/// `lead(rig, options)`: the frontend for a rig whose left camera leads; with a pair whose right one does not lead anyway, either
-/// of its cameras can. Each group of cameras has its own.
+/// `lead(rig, options)`: the frontend for a rig whose left camera leads.
 template <class Options, class Lead>
-std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, const Options& of_rig, Lead&& lead_with) {
-  const std::vector<CameraGroup> groups = leading_groups(rig);
-  const auto leads = [&](int camera) { return std::ranges::find(groups, camera, &CameraGroup::first) != groups.end(); };
-  const Options options = shared_by(of_rig, groups.size());
-  const auto lead = [&](const StereoRig& cameras) { return lead_with(cameras, options); };
-  std::vector<std::unique_ptr<SharingFrontend>> frontends;
-  for (const CameraGroup& group : groups) {
-    const StereoRig cameras = rig_of(rig, group);
-    if (group.second && !leads(*group.second))
-      frontends.push_back(std::make_unique<EitherCamera>(cameras, lead(cameras), lead(mirrored(cameras))));
-    else frontends.push_back(lead(cameras));
-  }
-  if (groups.size() == 1) return std::move(frontends.front());
-  return std::make_unique<RigFrontend>(groups, std::move(frontends), of_rig.max_features);
+std::unique_ptr<Frontend> with_shares(const StereoRig& rig, const Options& of_rig, Lead&& lead) {
+  const Options options = shared_by(of_rig, leading_groups(rig).size());
+  return for_each_group(rig, of_rig.max_features, [&](const StereoRig& cameras) { return lead(cameras, options); });
 }
 
 Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
-  return for_each_group(rig, options.klt, [](const StereoRig& r, const auto& o) { return std::make_unique<KltFrontend>(r, o); });
+  return with_shares(rig, options.klt, [](const StereoRig& r, const auto& o) { return std::make_unique<KltFrontend>(r, o); });
 }
 
 std::unique_ptr<Frontend> orb_with(const StereoRig& rig, const OrbFrontendOptions& options,
                                    const std::shared_ptr<DescriptorStage>& stage) {
-  return for_each_group(rig, options,
+  return with_shares(rig, options,
                         [&](const StereoRig& r, const auto& o) { return std::make_unique<OrbFrontend>(r, o, stage); });
 }
 
@@ -65,45 +54,51 @@ Made make_boost(const StereoRig& rig, const FrontendOptions& options) {
   return orb_with(rig, options.orb, std::move(*stage));
 }
 
-struct Registration {
-  std::string_view name, meaning;
-  Made (*make)(const StereoRig&, const FrontendOptions&);
-};
+/// All frontends, in the order of registration. The last of ours is the default.
+std::vector<FrontendKind>& kinds() {
+  static std::vector<FrontendKind> all = {
+      {"klt", "corners followed by Lucas-Kanade", make_klt},
+      {"orb", "ORB keypoints followed by patch alignment and descriptors", make_orb},
+      {"boost", "orb with descriptors improved by a network", make_boost},
+  };
+  return all;
+}
 
-/// All frontends. The last is the default.
-constexpr Registration kFrontends[] = {
-    {"klt", "corners followed by Lucas-Kanade", make_klt},
-    {"orb", "ORB keypoints followed by patch alignment and descriptors", make_orb},
-    {"boost", "orb with descriptors improved by a network", make_boost},
-};
+bool is_name(const std::string& name) {
+  const auto fits = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_'; };
+  return !name.empty() && std::ranges::all_of(name, fits);
+}
 
 }  // namespace
 
+Result<void> register_frontend(FrontendKind kind) {
+  if (!is_name(kind.name))
+    return Error{ErrorCode::invalid_argument, fmt::format("'{}' is no name of a frontend: letters, digits, '-' and '_'", kind.name)};
+  if (std::ranges::find(kinds(), kind.name, &FrontendKind::name) != kinds().end())
+    return Error{ErrorCode::invalid_argument, fmt::format("there is a frontend \"{}\" already", kind.name)};
+  kinds().push_back(std::move(kind));
+  return {};
+}
+
 std::vector<std::string> frontend_names() {
   std::vector<std::string> names;
-  for (const Registration& r : kFrontends) names.emplace_back(r.name);
+  for (const FrontendKind& kind : kinds()) names.push_back(kind.name);
   return names;
 }
 
-std::string default_frontend() { return std::string(std::end(kFrontends)[-1].name); }
+std::string default_frontend() { return "boost"; }
 
-const std::string& frontend_choices() {
-  static const std::string choices = fmt::format("{}", fmt::join(frontend_names(), "|"));
-  return choices;
-}
+std::string frontend_choices() { return fmt::format("{}", fmt::join(frontend_names(), "|")); }
 
-const std::string& frontend_meanings() {
-  static const std::string meanings = [] {
-    std::vector<std::string> lines;
-    for (const Registration& r : kFrontends) lines.push_back(fmt::format("{}: {}", r.name, r.meaning));
-    return fmt::format("{}", fmt::join(lines, "; "));
-  }();
-  return meanings;
+std::string frontend_meanings() {
+  std::vector<std::string> lines;
+  for (const FrontendKind& kind : kinds()) lines.push_back(fmt::format("{}: {}", kind.name, kind.meaning));
+  return fmt::format("{}", fmt::join(lines, "; "));
 }
 
 Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const FrontendOptions& options) {
-  for (const Registration& r : kFrontends)
-    if (r.name == options.kind) return r.make(rig, options);
+  for (const FrontendKind& kind : kinds())
+    if (kind.name == options.kind) return kind.make(rig, options);
   return Error{ErrorCode::invalid_argument,
                fmt::format("there is no frontend \"{}\"; there are {}", options.kind, fmt::join(frontend_names(), ", "))};
 }

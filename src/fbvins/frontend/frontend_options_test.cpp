@@ -6,6 +6,7 @@
 #include <set>
 
 #include "fbvins/core/options.hpp"
+#include "fbvins/frontend/frontend_registry.hpp"
 
 namespace fbvins {
 namespace frontend_options_test {
@@ -44,6 +45,40 @@ TEST(FrontendRegistry, WeightsThatAreNotThereAreAnError) {
   const auto made = make_frontend(rig(), options);
   ASSERT_FALSE(made.ok());
   EXPECT_NE(made.error().message.find("boost-x"), std::string::npos);
+}
+
+/// It stays registered for the other tests of this process.
+TEST(FrontendRegistry, OneOfYourOwnIsMadeByItsNameAndReadsItsOptions) {
+  struct Blind final : Frontend {
+    TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
+      TrackedFrame out;
+      out.has_left = packet.frame.left != nullptr;
+      return out;
+    }
+  };
+  const auto told = std::make_shared<std::string>();
+  const auto make = [told](const StereoRig&, const FrontendOptions& options) -> Result<std::unique_ptr<Frontend>> {
+    *told = options.own;
+    return std::unique_ptr<Frontend>(std::make_unique<Blind>());
+  };
+  ASSERT_TRUE(register_frontend({"blind", "sees nothing", make}).ok());
+  EXPECT_EQ(frontend_names().back(), "blind");
+  EXPECT_NE(frontend_meanings().find("blind: sees nothing"), std::string::npos);
+  EXPECT_EQ(default_frontend(), "boost");
+  FrontendOptions options;
+  options.kind = "blind";
+  options.own = "dark=1";
+  EXPECT_TRUE(validate(options).ok());
+  EXPECT_TRUE(make_frontend(rig(), options).ok());
+  EXPECT_EQ(*told, "dark=1");
+  EXPECT_NE(register_frontend({"blind", "", make}).error().message.find("already"), std::string::npos);
+  EXPECT_NE(register_frontend({"a|b", "", make}).error().message.find("'a|b'"), std::string::npos);
+}
+
+TEST(FrontendRegistry, AFileThatIsNoPluginIsRefusedByName) {
+  const std::string absent = testing::TempDir() + "/absent.so";
+  EXPECT_NE(load_frontends(absent).error().message.find(absent), std::string::npos);
+  EXPECT_NE(load_frontends("libm.so.6").error().message.find("./libm.so.6"), std::string::npos) << "not the system's";
 }
 
 TEST(FrontendOptions, AreValidForEveryNameAndForNoOther) {

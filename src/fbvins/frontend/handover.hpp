@@ -36,15 +36,8 @@ struct Handover {
   std::int64_t next_id = 0;  ///< of the next new track
 };
 
-/// A frontend of a group of cameras, which is told how many features it may follow.
-class SharingFrontend : public Frontend {
- public:
-  /// From the next image on; not more than it was made for.
-  virtual void follow_at_most(int features) = 0;
-};
-
 /// A frontend that follows the first camera of its rig, whichever that is, and measures depth with the second.
-class LeadingFrontend : public SharingFrontend {
+class LeadingFrontend : public Frontend {
  public:
   /// Another one follows this image.
   virtual void stand_by(const SensorPacket& packet, const StatePrior& prior) = 0;

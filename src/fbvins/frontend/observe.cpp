@@ -13,6 +13,12 @@ Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised
   return observation;
 }
 
+std::optional<Observation> observe(const Camera& camera, const Vec2& px, double sigma_px) {
+  const std::optional<Vec2> normalised = camera.undistort(px);
+  if (!normalised) return std::nullopt;
+  return observe(camera, px, *normalised, sigma_px);
+}
+
 Observation observe_depth(const Vec2& px, const Vec2& left_normalised, const MeasuredInverseDepth& depth) {
   Observation observation;
   observation.pixel = px;

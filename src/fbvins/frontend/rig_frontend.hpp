@@ -18,7 +18,7 @@ namespace fbvins {
 class RigFrontend final : public Frontend {
  public:
   /// `max_features`: that a rig of one group would follow.
-  RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<SharingFrontend>> frontends, int max_features);
+  RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends, int max_features);
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
   void locate(const LandmarkUpdate& update) override;
@@ -28,7 +28,7 @@ class RigFrontend final : public Frontend {
   void take_features(std::vector<TrackedFeature> features, std::size_t group, std::vector<TrackedFeature>& out) const;
 
   std::vector<CameraGroup> groups_;
-  std::vector<std::unique_ptr<SharingFrontend>> frontends_;
+  std::vector<std::unique_ptr<Frontend>> frontends_;
   TrackBudget budget_;
 };
 

@@ -100,7 +100,7 @@ TEST_P(RigFrontendOf, TheFeaturesOfABlindPairAreTheOthers) {
 INSTANTIATE_TEST_SUITE_P(All, RigFrontendOf, testing::Values("klt", "orb"));
 
 /// Keeps what it is told.
-struct Listener final : SharingFrontend {
+struct Listener final : Frontend {
   std::vector<LandmarkUpdate>* told;
   explicit Listener(std::vector<LandmarkUpdate>& updates) : told(&updates) {}
   TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
@@ -118,7 +118,7 @@ struct Listener final : SharingFrontend {
 
 TEST(RigFrontend, APositionGoesToTheFrontendOfItsTrack) {
   std::vector<LandmarkUpdate> told[2];
-  std::vector<std::unique_ptr<SharingFrontend>> frontends;
+  std::vector<std::unique_ptr<Frontend>> frontends;
   for (auto& updates : told) frontends.push_back(std::make_unique<Listener>(updates));
   RigFrontend rig({{0, 1}, {2, 3}}, std::move(frontends), 150);
   const std::vector<TrackedFeature> features = rig.process({}, {}).features;

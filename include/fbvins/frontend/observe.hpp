@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Observations of features for the estimator, with their weights. Pure functions.
+//
+//   feature.left = observe(rig.left, px, 0.5);   // found to half a pixel; nothing where the lens has no ray
 #pragma once
+
+#include <optional>
 
 #include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -9,6 +13,8 @@ namespace fbvins {
 
 /// `sigma_px`: standard deviation of the position in the raw image.
 Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised, double sigma_px);
+/// The same of a pixel alone; nothing where the lens has no ray for it.
+std::optional<Observation> observe(const Camera& camera, const Vec2& px, double sigma_px);
 
 /// A depth measured at a pixel of the left camera, as C1 sees it (StereoRig::depth): across the baseline only.
 Observation observe_depth(const Vec2& px, const Vec2& left_normalised, const MeasuredInverseDepth& depth);
