@@ -21,7 +21,7 @@ import numpy
 
 from . import _fbvins
 from ._fbvins import (Camera, Config, DepthSensor, ErrorStatistics, Evaluation, Features, ImuNoise, ImuSample, MapContents, MapUpdate, Odometry,
-                      Recording, Rig, StereoFrame, Trajectory, __version__, orb, simulation_presets)
+                      Recording, Rig, SensorPacket, StatePrior, StereoFrame, Trajectory, __version__, orb, register_frontend, simulation_presets)
 from ._fbvins import Booster
 from . import calibration
 from ._run import Run
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     AnyTrajectory = Union[Trajectory, Run, PathLike, Tuple["numpy.ndarray", "numpy.ndarray", "numpy.ndarray"]]
 
 __all__ = ["Booster", "Camera", "Config", "DepthSensor", "Diagnosis", "ErrorStatistics", "Finding", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
-           "MapUpdate", "Odometry", "Recording", "Rig", "Run", "StereoFrame", "System", "Trajectory", "__version__", "boost",
-           "calibration", "config", "convert", "doctor", "evaluate", "info", "load_map", "open", "orb", "report", "run", "simulate", "simulation_presets"]
+           "MapUpdate", "Odometry", "Recording", "Rig", "Run", "SensorPacket", "StatePrior", "StereoFrame", "System", "Trajectory", "__version__", "boost",
+           "calibration", "config", "convert", "doctor", "evaluate", "info", "load_map", "open", "orb", "register_frontend", "report", "run", "simulate", "simulation_presets"]
 
 
 def __dir__() -> Iterable[str]:

@@ -19,6 +19,7 @@ void bind_rig(nb::module_& m);
 void bind_config(nb::module_& m);
 void bind_recording(nb::module_& m);
 void bind_trajectory(nb::module_& m);
+void bind_frontend(nb::module_& m);
 void bind_odometry(nb::module_& m);
 void bind_system(nb::module_& m);
 void bind_map(nb::module_& m);

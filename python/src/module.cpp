@@ -10,6 +10,7 @@ NB_MODULE(_fbvins, m) {
   bind_config(m);
   bind_recording(m);
   bind_trajectory(m);
+  bind_frontend(m);
   bind_odometry(m);
   bind_map(m);
   bind_system(m);
