@@ -35,9 +35,10 @@ class TiltCheck {
   /// Gravity has to confirm the tilt.
   void doubt();
   bool in_doubt() const { return in_doubt_; }
-  /// Biases are being found anew, for a reason that is known.
+  /// Biases are being found anew, for a reason that is known: those of before confirm and refute nothing.
   void forget_biases() {
-    if (!in_doubt_) biases_.clear();
+    biases_.clear();
+    before_.reset(), refuted_.reset();
   }
   /// A window begins. Biases that were refuted before are remembered.
   void restart();

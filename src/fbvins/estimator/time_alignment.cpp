@@ -16,7 +16,7 @@ constexpr int kEachBefore = 2, kEachInFlight = 20;
 constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
 /// Before the start one that was found is improved by less.
 constexpr double kImproved_sigma = 1;
-/// In flight so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
+/// In flight, where it was known better than that, so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
 /// A line delay likewise: global shutters stay what they are. Where the offset was wrong nobody has calibrated the line delay, either.
 constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma = 2.5;
@@ -63,6 +63,16 @@ bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   return changed || line_delay_s_ != line_delay_before_s;
 }
 
+bool TimeAlignment::is_applied() const {
+  return !cut_by_ || std::abs((*cut_by_ - given_ - found_).seconds()) < std::max(kLeast_s, sigma_s_);
+}
+
+bool TimeAlignment::known() const {
+  if (!enabled_ || frames_ >= kLongestWait) return true;
+  const bool precise = alignment_.pairs() >= kFewestForStart && sigma_s_ < kPreciseForStart_s;
+  return (precise || alignment_.pairs() >= kEnoughForStart) && is_applied();
+}
+
 void TimeAlignment::solve(bool running) {
   const std::optional<GyroAlignmentEstimate> found = alignment_.solve();
   if (!found || found->pairs < kFewestForStart) return;
@@ -73,8 +83,12 @@ void TimeAlignment::solve(bool running) {
   const double off_s = std::abs(found->time_offset_s() - found_.seconds());
   const double certain = running || found_ == Duration{} ? kCertain_sigma : kImproved_sigma;
   off_ = off_s > kLeast_s && off_s > certain * found->time_offset_sigma_s() ? off_ + 1 : 0;
-  if (off_ >= (running ? kInARow : 1))
+  const bool better = found->time_offset_sigma_s() < found_sigma_s_;
+  if (off_ == 0) found_sigma_s_ = std::min(found_sigma_s_, found->time_offset_sigma_s());
+  else if (off_ >= (running && found_sigma_s_ < kLeast_s ? kInARow : 1) && (running || better)) {
     found_ = Duration::from_seconds(found->time_offset_s());
+    found_sigma_s_ = found->time_offset_sigma_s();
+  }
   const double line_off_s = std::abs(found->line_delay_s() - line_delay_s_);
   const double line_sigmas = found_ == Duration{} ? kCertainLine_sigma : kDoubtedLine_sigma;
   if (found->pairs < kEnoughForStart || line_off_s < std::max(kLeastLine_s, line_sigmas * found->line_delay_sigma_s())) return;

@@ -26,11 +26,8 @@ class TimeAlignment {
   /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight, and where
   /// the line delay is another from here on.
   bool add(const TrackedFrame& frame, bool running);
-  /// Whether enough was seen to notice an offset that would spoil a start in motion.
-  bool known() const {
-    const bool precise = alignment_.pairs() >= kFewestForStart && sigma_s_ < kPreciseForStart_s;
-    return !enabled_ || precise || alignment_.pairs() >= kEnoughForStart || frames_ >= kLongestWait;
-  }
+  /// Whether enough was seen to notice an offset that would spoil a start in motion, and the newest frame was cut by what was found.
+  bool known() const;
   Duration correction() const { return correction_; }
   /// Of the correction, 0 before it is known to anything.
   double sigma_s() const;
@@ -52,12 +49,15 @@ class TimeAlignment {
   static constexpr int kLongestWait = 40;
   static constexpr double kUnknown_s = 1;
   void solve(bool running);
+  /// The newest frame was cut by what has been found since.
+  bool is_applied() const;
 
   bool enabled_;
   Duration given_;
   GyroAlignment alignment_;
   int frames_ = 0;
   Duration correction_{}, found_{};
+  double found_sigma_s_ = kUnknown_s;  ///< of the best solution that agrees with what was found
   double line_delay_s_ = 0, jitter_s_ = 0, sigma_s_ = kUnknown_s;
   int solves_ = 0, off_ = 0;  ///< and those in a row that found the offset off
   std::optional<Time> changed_;                      ///< the correction, last
