@@ -69,8 +69,6 @@ class SlidingWindow {
   const KnownLandmarks& known() const { return known_; }
 
  private:
-  /// Not with UpDirection::fixed: there G turns as gravity becomes better known, and remembered positions would be wrong.
-  bool remembers_landmarks() const { return options_.known_landmarks.enabled && weights_.estimate_tilt; }
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);
   void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
