@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/frontend/fixed_edges.hpp"
+#include "fbvins/doctor/fixed_edges.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,12 @@ constexpr float kMostlyThere = 0.8f;
 /// through. Different edges of the scene that meet at a pixel, such as a room's under its ceiling, leave a mean that is weak
 /// beside each of them.
 constexpr float kOneEdge = 0.15f;
-/// What was fixed is so until it has less than this share of what a new edge needs.
-constexpr float kStill = 0.6f;
+/// What pixels so near have in common is vignetting, and no edge. Lengths and areas are in pixels of the small image.
+constexpr int kAround_px = 15;
+/// Gaps in a fixed thing that are filled, specks that are none, and the smallest thing.
+constexpr int kGap_px = 5, kSpeck_px = 1, kSmallest_px = 80;
+/// The outer side of an edge, where the scene shows through the blur.
+constexpr int kSkirt_px = 1;
 
 /// Eight times Sobel's gradient at the pixels of a row.
 struct EightfoldGradient {
@@ -86,14 +90,14 @@ Image inverted(Image image) {
 
 Image shrunk(const Image& seen, int by) { return inverted(grown(inverted(seen), by)); }
 
-/// Makes connected parts of a colour that have fewer pixels black where they are white, and white where they are black.
-void drop_small(Image& seen, std::uint8_t colour, int fewest) {
+/// Makes connected black parts that have fewer pixels white.
+void drop_small(Image& seen, int fewest) {
   Image done(seen.width(), seen.height(), 0);
   std::vector<std::pair<int, int>> part;
   for (int y = 0; y < seen.height(); ++y)
     for (int x = 0; x < seen.width(); ++x) {
       const auto take = [&](int u, int v) {
-        if (u < 0 || v < 0 || u >= seen.width() || v >= seen.height() || seen.at(u, v) != colour || done.at(u, v) != 0) return;
+        if (u < 0 || v < 0 || u >= seen.width() || v >= seen.height() || seen.at(u, v) != 0 || done.at(u, v) != 0) return;
         done.at(u, v) = 1;
         part.emplace_back(u, v);
       };
@@ -104,48 +108,29 @@ void drop_small(Image& seen, std::uint8_t colour, int fewest) {
         take(u - 1, v), take(u + 1, v), take(u, v - 1), take(u, v + 1);
       }
       if (part.size() < static_cast<std::size_t>(fewest))
-        for (const auto& [u, v] : part) seen.at(u, v) = static_cast<std::uint8_t>(255 - colour);
+        for (const auto& [u, v] : part) seen.at(u, v) = 255;
     }
 }
 
 }  // namespace
 
-void FixedEdges::add(Look look, std::size_t most) {
+void FixedEdges::add(Look look) {
   if (looks_.empty()) {
     width_ = look.image->width(), height_ = look.image->height();
     sums_x_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
     sums_y_ = squares_ = sums_x_;
   }
-  const bool full = looks_.size() >= most;
-  count(*look.image, full ? looks_.front().image.get() : nullptr);
-  if (full) looks_.erase(looks_.begin());
-  looks_.push_back(std::move(look));
-}
-
-void FixedEdges::count(const Image& added, const Image* dropped) {
-  const auto squared = [](std::int16_t a, std::int16_t b) { return std::int32_t{a} * a + std::int32_t{b} * b; };
   for (int y = 1; y + 1 < height_; ++y) {
-    const auto begin = static_cast<std::ptrdiff_t>(y) * width_;
-    std::int32_t *const sums_x = sums_x_.data() + begin, *const sums_y = sums_y_.data() + begin;
-    std::int32_t* const squares = squares_.data() + begin;
-    const EightfoldGradient in(added, y);
-    if (dropped == nullptr) {
-      for (int x = 1; x + 1 < width_; ++x) {
-        const std::int16_t in_x = in.x(x), in_y = in.y(x);
-        sums_x[x] += in_x;
-        sums_y[x] += in_y;
-        squares[x] += squared(in_x, in_y);
-      }
-      continue;
-    }
-    const EightfoldGradient out(*dropped, y);
+    const EightfoldGradient gradients(*look.image, y);
     for (int x = 1; x + 1 < width_; ++x) {
-      const std::int16_t in_x = in.x(x), in_y = in.y(x), out_x = out.x(x), out_y = out.y(x);
-      sums_x[x] += in_x - out_x;
-      sums_y[x] += in_y - out_y;
-      squares[x] += squared(in_x, in_y) - squared(out_x, out_y);
+      const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+      const std::int32_t by_x = gradients.x(x), by_y = gradients.y(x);
+      sums_x_[i] += by_x;
+      sums_y_[i] += by_y;
+      squares_[i] += by_x * by_x + by_y * by_y;
     }
   }
+  looks_.push_back(std::move(look));
 }
 
 /// Motion of a far point at a pixel of the small image by a small turn, px of the camera a radian: by its lens, at whose edge a
@@ -153,7 +138,7 @@ void FixedEdges::count(const Image& added, const Image* dropped) {
 Eigen::Matrix<float, 2, 3> FixedEdges::motion_by_turn(int x, int y) const {
   constexpr double kTurn_rad = 1e-3;
   Eigen::Matrix<float, 2, 3> out = Eigen::Matrix<float, 2, 3>::Zero();
-  const Vec2 pixel(rule_.reduction * x, rule_.reduction * y);
+  const Vec2 pixel(kReduction * x, kReduction * y);
   const auto ray = camera_.ray(pixel);
   for (int i = 0; ray && i < 3; ++i) {
     const auto there = camera_.pixel_of(*ray + kTurn_rad * Vec3::Unit(i).cross(*ray));
@@ -164,20 +149,18 @@ Eigen::Matrix<float, 2, 3> FixedEdges::motion_by_turn(int x, int y) const {
 }
 
 /// Whether an edge at the pixel stays while the scene moves across it. `shared` by vignetting.
-FixedEdges::Verdict FixedEdges::judge(int x, int y, const Eigen::Vector2f& shared, bool was_fixed) const {
+bool FixedEdges::stays(int x, int y, const Eigen::Vector2f& shared) const {
   const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   const auto count = static_cast<float>(looks_.size());
   const Eigen::Vector2f sum = 0.125f * Eigen::Vector2f(static_cast<float>(sums_x_[i]), static_cast<float>(sums_y_[i]));
   const Eigen::Vector2f mean = sum / count - shared;
-  const float ease = was_fixed ? kStill : 1;
-  if (mean.squaredNorm() < ease * ease * kEdge * kEdge) return Verdict::not_fixed;
+  if (mean.squaredNorm() < kEdge * kEdge) return false;
   const float squares = static_cast<float>(squares_[i]) / 64 - 2 * shared.dot(sum) + count * shared.squaredNorm();
-  if (mean.squaredNorm() * count < ease * kOneEdge * squares) return Verdict::not_fixed;
-  return judge_each_look(x, y, mean, shared, ease);
+  if (mean.squaredNorm() * count < kOneEdge * squares) return false;
+  return stays_in_each_look(x, y, mean, shared);
 }
 
-FixedEdges::Verdict FixedEdges::judge_each_look(int x, int y, const Eigen::Vector2f& mean, const Eigen::Vector2f& shared,
-                                                float ease) const {
+bool FixedEdges::stays_in_each_look(int x, int y, const Eigen::Vector2f& mean, const Eigen::Vector2f& shared) const {
   const float strength = mean.norm();
   const Eigen::Vector2f across = mean / strength;
   std::vector<bool> there;
@@ -186,38 +169,35 @@ FixedEdges::Verdict FixedEdges::judge_each_look(int x, int y, const Eigen::Vecto
     there.push_back((gradient(*look.image, x, y) - shared).dot(across) > kStrength * strength);
     present += there.back();
   }
-  if (static_cast<float>(present) < ease * kMostlyThere * static_cast<float>(looks_.size())) return Verdict::not_fixed;
+  if (static_cast<float>(present) < kMostlyThere * static_cast<float>(looks_.size())) return false;
   const Eigen::RowVector3f by_turn = across.transpose() * motion_by_turn(x, y);
   int pairs = 0, stayed = 0;
   for (std::size_t i = kLooksApart; i < looks_.size(); ++i) {
     const Look& look = looks_[i];
-    if (std::abs(look.moved_px.dot(across)) < rule_.across_px ||
-        std::abs(by_turn.dot(look.turned_rad)) < rule_.across_px + by_turn.norm() * look.by_bias_rad)
+    if (std::abs(look.moved_px.dot(across)) < kAcross_px ||
+        std::abs(by_turn.dot(look.turned_rad)) < kAcross_px + by_turn.norm() * look.by_bias_rad)
       continue;
     ++pairs;
     stayed += there[i - kLooksApart] && there[i];
   }
-  if (pairs < rule_.fewest_pairs) return Verdict::unknown;
-  return static_cast<float>(stayed) >= ease * kMostlyThere * static_cast<float>(pairs) ? Verdict::fixed : Verdict::not_fixed;
+  return pairs >= kFewestPairs && static_cast<float>(stayed) >= kMostlyThere * static_cast<float>(pairs);
 }
 
-Image FixedEdges::edges(const Image* before) const {
+Image FixedEdges::edges() const {
   Image out(width_, height_, 255);
-  SquareSums squares_x(sums_x_, width_, height_, rule_.around_px), squares_y(sums_y_, width_, height_, rule_.around_px);
+  SquareSums squares_x(sums_x_, width_, height_, kAround_px), squares_y(sums_y_, width_, height_, kAround_px);
   std::vector<std::int32_t> around_x(static_cast<std::size_t>(width_)), around_y(around_x);
   const float scale = 0.125f / static_cast<float>(looks_.size());
   for (int y = 1; y + 1 < height_; ++y) {
     squares_x.next(y, around_x);
     squares_y.next(y, around_y);
-    const int rows = std::min(height_ - 2, y + rule_.around_px) - std::max(1, y - rule_.around_px) + 1;
+    const int rows = std::min(height_ - 2, y + kAround_px) - std::max(1, y - kAround_px) + 1;
     for (int x = 1; x + 1 < width_; ++x) {
-      const int columns = std::min(width_ - 2, x + rule_.around_px) - std::max(1, x - rule_.around_px) + 1;
+      const int columns = std::min(width_ - 2, x + kAround_px) - std::max(1, x - kAround_px) + 1;
       const auto i = static_cast<std::size_t>(x);
       const float share = scale / static_cast<float>(rows * columns);
       const Eigen::Vector2f shared(share * static_cast<float>(around_x[i]), share * static_cast<float>(around_y[i]));
-      const bool was_fixed = before != nullptr && before->at(x, y) == 0;
-      const Verdict verdict = judge(x, y, shared, was_fixed);
-      if (verdict == Verdict::fixed || (verdict == Verdict::unknown && was_fixed)) out.at(x, y) = 0;
+      if (stays(x, y, shared)) out.at(x, y) = 0;
     }
   }
   return out;
@@ -226,11 +206,10 @@ Image FixedEdges::edges(const Image* before) const {
 Image FixedEdges::parts(Image seen) const {
   const ImageView all = seen.view();
   if (std::all_of(all.data, all.row(all.height), [](std::uint8_t value) { return value != 0; })) return seen;
-  seen = shrunk(grown(seen, rule_.gap_px), rule_.gap_px);
-  seen = grown(shrunk(seen, rule_.speck_px), rule_.speck_px);
-  drop_small(seen, 255, rule_.largest_hole_px);
-  drop_small(seen, 0, rule_.smallest_px);
-  return grown(seen, rule_.skirt_px);
+  seen = shrunk(grown(seen, kGap_px), kGap_px);
+  seen = grown(shrunk(seen, kSpeck_px), kSpeck_px);
+  drop_small(seen, kSmallest_px);
+  return grown(seen, kSkirt_px);
 }
 
 }  // namespace fbvins
