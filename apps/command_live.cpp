@@ -140,7 +140,7 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (counter && counter->was_unreadable())
     warn(fmt::format("{}: there is no reset counter in it; the first one is {}", arguments.outputs.reset_counter,
                      counter->first()));
-  LiveFlight flight{config, source, arguments.source, arguments.map, kept, map};  // before `live`, whose services use it
+  LiveFlight flight{config, source, arguments.source, arguments.map, kept, map};  // before `live`, whose commands use it
   SystemParts parts{.mapper = kept, .imu_state = imu_state_for_flight(arguments.imu_state, source.rig().imu_noise)};
   auto live = LiveSystem::create(config, config.live, source.rig(), source.clock_rate(), std::move(parts),
                                  counter ? counter->first() : 0);
@@ -148,7 +148,7 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (auto sink = source.status_sink()) live->add_sink(std::move(sink));
   if (counter) live->add_sink(std::move(counter));
   if (Result<void> added = add_outputs(arguments.outputs, flight, *live, totals, troubles); !added) return added;
-  if (Result<void> added = graph.add_sinks(source, config, flight_commands(flight, *live), *live); !added) return added;
+  if (Result<void> added = graph.add_sinks(source, config.live, *live); !added) return added;
   const auto faults = faults_of(arguments, source.rig().camera_count());
   if (!faults) return faults.error();
   if (Result<void> added = add_page(arguments.outputs.web, flight, *live); !added)

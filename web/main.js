@@ -84,6 +84,7 @@ const on = {
     element("mark").disabled = !message.can_mark;
     element("mark").hidden = message.replay;
     offer("save-map", message.commands.save_map, "Writes the map after the next keyframe");
+    offer("load-map", message.commands.load_map, "Goes on with the map in the file; what this flight added since is forgotten");
     offer("record", message.commands.start_record, "Begins or ends a flight record");
     offer("reset", message.commands.reset, element("reset").title);
     showHealth("none", "No image has come yet.", "Waiting");
@@ -172,6 +173,7 @@ const player = new Player(stream);
 
 element("mark").addEventListener("click", () => stream.send({ do: "mark", text: "" }));
 element("save-map").addEventListener("click", () => { stream.send({ do: "save_map" }); note("The map will be saved after the next keyframe.", false, false); });
+element("load-map").addEventListener("click", () => { stream.send({ do: "load_map" }); });
 element("record").addEventListener("click", event => stream.send({ do: event.currentTarget.dataset.does ?? "start_record" }));
 element("reset").addEventListener("click", () => {
   element("reset-dialog").returnValue = "";  // that of the time before
