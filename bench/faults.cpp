@@ -34,7 +34,7 @@
 #include "fbvins/eval/alignment.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/live/ingest.hpp"
-#include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/faults/sensor_faults.hpp"
 #include "fbvins/pipeline/system.hpp"
 
 namespace fbvins::bench {

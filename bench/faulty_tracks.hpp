@@ -17,7 +17,7 @@
 #include "bench/synthetic_tracks.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/frontend/frontend.hpp"
-#include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/faults/sensor_faults.hpp"
 
 namespace fbvins::bench {
 

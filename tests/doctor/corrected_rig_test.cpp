@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "fbvins/doctor/corrected_rig.hpp"
-#include "fbvins/doctor/setup_faults.hpp"
+#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "tests/rendered_recording.hpp"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/doctor/setup_faults.hpp"
+#include "fbvins/faults/setup_faults.hpp"
 
 #include <array>
 
-#include "fbvins/doctor/setup_fault_lists.hpp"
+#include "fbvins/faults/setup_fault_lists.hpp"
 
 namespace fbvins {
 

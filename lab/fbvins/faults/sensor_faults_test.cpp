@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/faults/sensor_faults.hpp"
 
 #include <gtest/gtest.h>
 

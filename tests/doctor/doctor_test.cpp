@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/doctor/setup_faults.hpp"
+#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/live/reading_faults.hpp"
+#include "fbvins/faults/reading_faults.hpp"
 
 #include <cmath>
 #include <limits>

@@ -5,11 +5,11 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/doctor/common_mistakes.hpp"
-#include "fbvins/doctor/setup_faults.hpp"
+#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {
-namespace corrected_rig_test {
+namespace common_mistakes_test {
 
 Finding of(FindingKind kind, double size = 1) {
   Finding finding;
@@ -98,5 +98,5 @@ TEST(CalibrationLines, EachFieldHasOneLineAtItsFirstFinding) {
   EXPECT_EQ(findings[2].corrected, "");
 }
 
-}  // namespace corrected_rig_test
+}  // namespace common_mistakes_test
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/live/image_faults.hpp"
+#include "fbvins/faults/image_faults.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -16,8 +16,8 @@
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/live/image_faults.hpp"
-#include "fbvins/live/reading_faults.hpp"
+#include "fbvins/faults/image_faults.hpp"
+#include "fbvins/faults/reading_faults.hpp"
 #include "fbvins/live/source.hpp"
 
 namespace fbvins {
