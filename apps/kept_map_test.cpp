@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "apps/test_files.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace kept_map_test {

@@ -50,11 +50,10 @@ using OdometryState = std::tuple<std::vector<std::int64_t>, std::vector<double>>
 
 OdometryState state_of(Odometry& o) {
   const EstimatorStats& s = o.stats;
-  OdometryState out{
-      {o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason), o.health.without_cameras,
-       o.reset_counter, s.frames_in_window, s.landmarks, s.known_landmarks,
-       s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
-      {}};
+  OdometryState out{{o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason),
+                     o.health.without_cameras, o.reset_counter, s.frames_in_window, s.landmarks, s.known_landmarks,
+                     s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
+                    {}};
   each_number(o, [&](double x) { std::get<1>(out).push_back(x); });
   return out;
 }

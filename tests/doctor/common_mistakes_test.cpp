@@ -6,7 +6,7 @@
 
 #include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/faults/setup_faults.hpp"
-#include "fbvins/doctor/synthetic_evidence.hpp"
+#include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
 namespace common_mistakes_test {

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "fbvins/faults/setup_faults.hpp"
-#include "fbvins/doctor/synthetic_evidence.hpp"
+#include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
 namespace doctor_test {

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "fbvins/core/options.hpp"
-#include "fbvins/frontend/passed_wall.hpp"
+#include "tests/support/passed_wall.hpp"
 
 namespace fbvins {
 namespace orb_frontend_test {

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/frontend/orb_options.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins::passed_wall {
 

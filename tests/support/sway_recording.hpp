@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/pipeline/system.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins::sway_recording {
 

@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
-#include "fbvins/io/kalibr_test_files.hpp"
 #include "fbvins/live/host_clock.hpp"
-#include "fbvins/v4l2/fake_video.hpp"
 #include "fbvins/v4l2/v4l2_source.hpp"
+#include "tests/support/fake_video.hpp"
+#include "tests/support/kalibr_test_files.hpp"
 
 namespace fbvins::running_source {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "fbvins/live/socket_source.hpp"
-#include "fbvins/live/socket_test_sender.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins::socket_source_fixture {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/v4l2/fake_video.hpp"
+#include "tests/support/fake_video.hpp"
 
 #include <dlfcn.h>
 #include <fcntl.h>

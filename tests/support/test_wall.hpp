@@ -2,8 +2,8 @@
 // For tests of the frontends' parts: a textured wall 3 m ahead of a camera that faces it and moves sideways.
 #pragma once
 
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/frontend/orb_track.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 
