@@ -28,8 +28,8 @@
 #include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_journal.hpp"
-#include "fbvins/loop/test_room.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
+#include "tests/support/test_room.hpp"
 
 using namespace fbvins;
 

@@ -11,7 +11,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/loop/loop_closer.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins::test_room {
 

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "fbvins/loop/place_extractor.hpp"
-#include "fbvins/loop/test_room.hpp"
 #include "tests/support/noise_texture.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace earlier_views_test {

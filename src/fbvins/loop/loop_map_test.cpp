@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/test_room.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 #include "tests/support/noise_texture.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace loop_map_test {
