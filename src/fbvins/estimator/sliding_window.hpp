@@ -75,8 +75,8 @@ class SlidingWindow {
   void forget_observations(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);
   void remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving, std::span<const Mat3> information);
-  void remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
-                               const Calibration& calibration);
+  void keep_newest_observations(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
+                                const Calibration& calibration);
 
   /// Working memory of marginalise_keyframe() and drop_frame().
   struct Leaving {
