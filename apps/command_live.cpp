@@ -142,10 +142,15 @@ void save(const Arguments& arguments, const Config& config, const Source& source
   troubles.add(save_imu_state(arguments.imu_state, totals.imu_state, source.rig().imu_noise));
   if (map) {
     troubles.add(guarded("loop closure", [&] { map->finish(); }));
-    if (const std::string damage = map->damage(); !damage.empty()) warn(damage);
     for (const auto& [session, why] : map->not_joined())
       warn(fmt::format("session {} of this flight is no part of the map: {}", session, why));
-    troubles.add(save_map(arguments.map, *map));
+    const std::string damage = map->damage();
+    if (!damage.empty() && !arguments.kept_map.empty()) {
+      retire_kept_map(arguments.kept_map, damage);
+    } else {
+      if (!damage.empty()) warn(damage);
+      troubles.add(save_map(arguments.map, *map));
+    }
   }
   const std::string& folder = arguments.outputs.out;
   const LiveSummary summary = summarise(totals, arguments.source, config.frontend.kind, source, folder);
