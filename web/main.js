@@ -4,7 +4,8 @@ import { CameraView } from "./camera.js";
 import { clearFigures, setVehicle, showMap, showState, showStatus } from "./figures.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
-import { NoScene, Scene } from "./scene.js";
+import { FlatScene } from "./flat_scene.js";
+import { Scene } from "./scene.js";
 import { Stream } from "./stream.js";
 import { Timeline } from "./timeline.js";
 import { STATES, clock, healthSentence } from "./words.js";
@@ -19,16 +20,17 @@ const scene = makeScene();
 let newest_s = -Infinity;  // time of the newest point of the path
 
 function makeScene() {
+  const onGrid = cell => { element("grid-words").textContent = `grid ${cell} m`; };
+  let made;
   try {
-    const made = new Scene(element("scene"),
-      scale => { element("ellipsoid-words").textContent = `position uncertainty, 3σ${scale > 1 ? `, drawn ×${scale}` : ""}`; },
-      cell => { element("grid-words").textContent = `grid ${cell} m`; });
-    made.clear();
-    return made;
+    made = new Scene(element("scene"),
+      scale => { element("ellipsoid-words").textContent = `position uncertainty, 3σ${scale > 1 ? `, drawn ×${scale}` : ""}`; }, onGrid);
   } catch {
     element("no-webgl").hidden = false;
-    return new NoScene();
+    made = new FlatScene(element("scene"), onGrid);
   }
+  made.clear();
+  return made;
 }
 
 function showHealth(state, words, title = STATES[state] ?? "Connecting") {
