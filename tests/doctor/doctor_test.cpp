@@ -2,6 +2,7 @@
 // The doctor on synthetic evidence: silent where all is well, and each wrong setup named with its size.
 #include "fbvins/doctor/doctor.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
