@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "tests/support/test_room.hpp"
 
