@@ -4,10 +4,10 @@
 
 #include <fstream>
 
-#include "apps/test_files.hpp"
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/calibration/calibration_files.hpp"
 #include "fbvins/calibration/simulated_board.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace calibration_formats_test {

@@ -10,7 +10,6 @@
 #include "apps/commands.hpp"
 #include "apps/config_arguments.hpp"
 #include "apps/flight_report.hpp"
-#include "apps/progress.hpp"
 #include "apps/run_summary.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/config/option_fields.hpp"

@@ -10,6 +10,7 @@
 #include "apps/config_arguments.hpp"
 #include "apps/first_look.hpp"
 #include "apps/imu_state.hpp"
+#include "apps/injected_faults.hpp"
 #include "apps/kept_map.hpp"
 #include "apps/live_check.hpp"
 #include "apps/live_outputs.hpp"
@@ -25,7 +26,6 @@
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/reset_counter_sink.hpp"
-#include "fbvins/live/sensor_faults.hpp"
 #include "fbvins/pipeline/stage_runner.hpp"
 
 namespace fbvins::app {
@@ -45,8 +45,6 @@ sources:
   oak[:DEVICE][:@HZ], orbbec[:SERIAL][:640x480@30], zed[:/dev/videoN]:672x376  by their makers' Python packages (docs/devices.md)
   v4l2:CAM0,CAM1,...,IMU     video devices, or one with all images side by side; the IMU is a flight controller's (udp:..., serial:...)
                              or another process's (socket:...); needs --calibration (docs/v4l2.md)
-faults to inject for tests, in seconds of the flight: --fault KIND:START:LENGTH[:AMOUNT]
-  camera_off, imu_frozen, gyro_clipped:..:RAD/S, right_late, leap:..:SECONDS and some fifty others: docs/live.md has their table
 
 examples:
   fbvins live --source replay:MH_01_easy --out out/live
@@ -57,7 +55,6 @@ examples:
   fbvins live --source replay:MH_01_easy --record flight.mcap
   fbvins live --source replay:MH_01_easy --web 8080
   fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor finds
-  fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
 struct Arguments {
@@ -81,30 +78,11 @@ MapArguments map_arguments(const Arguments& arguments) {
   return map;
 }
 
-/// `cameras`: of the rig.
-Result<std::vector<SensorFault>> faults_of(const Arguments& arguments, int cameras) {
-  std::vector<SensorFault> faults;
-  for (const std::string& text : arguments.faults) {
-    auto fault = parse_fault(text);
-    if (!fault) return fault.error();
-    if (fault->camera >= cameras)
-      return Error{ErrorCode::invalid_argument, fmt::format("fault '{}': the rig's cameras are 0 to {}", text, cameras - 1)};
-    faults.push_back(*fault);
-  }
-  return faults;
-}
-
-Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault>& faults) {
+Result<void> fly(Source& source, LiveSystem& live, const std::vector<std::string>& faults) {
   const StopSignal stop([&] { source.stop(); });
   live.on_failure([&] { source.stop(); });
   FirstLook look(live.input(), source.rig(), [](const Finding& finding) { warn(to_text(finding)); });
-  Result<void> ended;
-  if (faults.empty()) {
-    ended = source.run(look);
-  } else {
-    FaultyInput faulty(look, faults);
-    ended = source.run(faulty);
-  }
+  const Result<void> ended = run_with_faults(source, look, faults);
   const Result<void> done = live.finish();
   return ended ? done : ended;
 }
@@ -140,7 +118,7 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (counter && counter->was_unreadable())
     warn(fmt::format("{}: there is no reset counter in it; the first one is {}", arguments.outputs.reset_counter,
                      counter->first()));
-  LiveFlight flight{config, source, arguments.source, arguments.map, kept, map};  // before `live`, whose services use it
+  LiveFlight flight{config, source, arguments.source, arguments.map, kept, map};  // before `live`, whose commands use it
   SystemParts parts{.mapper = kept, .imu_state = imu_state_for_flight(arguments.imu_state, source.rig().imu_noise)};
   auto live = LiveSystem::create(config, config.live, source.rig(), source.clock_rate(), std::move(parts),
                                  counter ? counter->first() : 0);
@@ -148,12 +126,11 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (auto sink = source.status_sink()) live->add_sink(std::move(sink));
   if (counter) live->add_sink(std::move(counter));
   if (Result<void> added = add_outputs(arguments.outputs, flight, *live, totals, troubles); !added) return added;
-  if (Result<void> added = graph.add_sinks(source, config, flight_commands(flight, *live), *live); !added) return added;
-  const auto faults = faults_of(arguments, source.rig().camera_count());
-  if (!faults) return faults.error();
+  if (Result<void> added = graph.add_sinks(source, config.live, *live); !added) return added;
+  if (Result<void> good = check_faults(arguments.faults, source.rig().camera_count()); !good) return good;
   if (Result<void> added = add_page(arguments.outputs.web, flight, *live); !added)
     return added;  // last: its viewers reach the others
-  const Result<void> flown = fly(source, *live, *faults);
+  const Result<void> flown = fly(source, *live, arguments.faults);
   if (kept) kept->finish();
   totals.last = live->status();
   return flown;
@@ -165,10 +142,15 @@ void save(const Arguments& arguments, const Config& config, const Source& source
   troubles.add(save_imu_state(arguments.imu_state, totals.imu_state, source.rig().imu_noise));
   if (map) {
     troubles.add(guarded("loop closure", [&] { map->finish(); }));
-    if (const std::string damage = map->damage(); !damage.empty()) warn(damage);
     for (const auto& [session, why] : map->not_joined())
       warn(fmt::format("session {} of this flight is no part of the map: {}", session, why));
-    troubles.add(save_map(arguments.map, *map));
+    const std::string damage = map->damage();
+    if (!damage.empty() && !arguments.kept_map.empty()) {
+      retire_kept_map(arguments.kept_map, damage);
+    } else {
+      if (!damage.empty()) warn(damage);
+      troubles.add(save_map(arguments.map, *map));
+    }
   }
   const std::string& folder = arguments.outputs.out;
   const LiveSummary summary = summarise(totals, arguments.source, config.frontend.kind, source, folder);
@@ -180,7 +162,7 @@ int run(Arguments arguments) {
   const StopSignals signals;  // before any thread is made
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
-  if (const auto faults = faults_of(arguments, kMostCameras); !faults) return fail(faults.error().message);
+  if (const Result<void> good = check_faults(arguments.faults, kMostCameras); !good) return fail(good.error().message);
   const auto graph = RosGraph::join(arguments.ros2, arguments.source, config->live.ros2);
   if (!graph) return fail(graph.error().message);
   const auto source = source_of(arguments, *graph);
@@ -248,9 +230,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
       ->take_last();
   command->add_option("--check", arguments->check_s, "check the sensors for this many seconds, print what is wrong, and end")
       ->check(CLI::PositiveNumber);
-  command->add_option("--fault", arguments->faults, "sensor fault to inject (see below); may be repeated")
-      ->take_all()
-      ->allow_extra_args(false);
+  add_fault_option(*command, arguments->faults);
   command->callback([arguments, &exit_code] {
     arguments->map = map_arguments(*arguments);
     exit_code = run(*arguments);

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "apps/commands.hpp"
-#include "apps/run_summary.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/tuning/tune_report.hpp"

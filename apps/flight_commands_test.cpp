@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "apps/live_outputs.hpp"
-#include "apps/no_sensors.hpp"
-#include "apps/test_files.hpp"
+#include "tests/support/no_sensors.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace flight_commands_test {

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "apps/test_files.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace imu_state_test {

@@ -14,10 +14,16 @@ namespace {
 
 constexpr Duration kWritePeriod{30'000'000'000};
 
+/// The file, with the journal that belongs to it.
+Result<std::string> set_map_aside(const std::string& file) {
+  Result<std::string> aside = set_aside(file);
+  if (aside) (void)std::rename(journal_of(file).c_str(), journal_of(*aside).c_str());
+  return aside;
+}
+
 /// Whether the file is out of the way.
 bool make_room(const std::string& file, const std::string& problem) {
-  const Result<std::string> aside = set_aside(file);
-  if (aside) (void)std::rename(journal_of(file).c_str(), journal_of(*aside).c_str());  // it belongs to the file
+  const Result<std::string> aside = set_map_aside(file);
   if (aside) warn(fmt::format("{}; it is kept as {}, and the flight begins a new map", problem, *aside));
   else warn(fmt::format("{}; {}: the flight's map will not be written", problem, aside.error().message));
   return aside.ok();
@@ -86,6 +92,12 @@ bool KeptMap::due(Time t) {
   if (t - written_ < kWritePeriod) return false;
   written_ = t;
   return true;
+}
+
+void retire_kept_map(const std::string& file, const std::string& damage) {
+  const Result<std::string> aside = set_map_aside(file);
+  if (aside) warn(fmt::format("{}; it is kept as {}, and the next flight begins a new map", damage, *aside));
+  else warn(fmt::format("{}; {}", damage, aside.error().message));
 }
 
 Result<std::unique_ptr<LoopMap>> make_kept_map(MapArguments& arguments, const StereoRig& rig, const LoopOptions& options) {

@@ -61,6 +61,10 @@ class KeptMap final : public Mapper {
   FileWriter writer_;                 ///< last: its thread uses the members above
 };
 
+/// After a flight that found damage in the features of its map's file, which cannot be written again: the file and its journal
+/// are set aside, and it is said.
+void retire_kept_map(const std::string& file, const std::string& damage);
+
 /// The map of `--map FILE`: continued if the file exists. An unusable file is set aside, said, and a new map begun; where that is
 /// not possible either the flight keeps no map, and `arguments.save` becomes empty. Errors: those of the installation, as in
 /// make_map.

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "apps/test_files.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace kept_map_test {
@@ -224,6 +224,16 @@ TEST_F(MakeKeptMap, ADamagedFileIsSetAsideAndTheFlightKeepsANewMap) {
   EXPECT_EQ(std::filesystem::file_size(file + ".bad"), 7u);
   EXPECT_FALSE(std::filesystem::exists(file + ".journal"));
   EXPECT_EQ(std::filesystem::file_size(file + ".bad.journal"), 5u) << "they belong together";
+}
+
+TEST_F(MakeKeptMap, AFileWithDamageFoundInFlightIsSetAsideAfterIt) {
+  std::ofstream(file) << "a map";
+  std::ofstream(file + ".journal") << "of it";
+  retire_kept_map(file, "flat.fbm: damaged map: keyframe 7 is not as it was written");
+  EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_FALSE(std::filesystem::exists(file + ".journal"));
+  EXPECT_EQ(std::filesystem::file_size(file + ".bad"), 5u);
+  EXPECT_EQ(std::filesystem::file_size(file + ".bad.journal"), 5u);
 }
 
 TEST_F(MakeKeptMap, WithoutAFolderTheFlightHasAMapAndKeepsNone) {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/live_summary.hpp"
-#include "apps/test_files.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace live_files_test {

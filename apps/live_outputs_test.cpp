@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "apps/no_sensors.hpp"
-#include "apps/test_files.hpp"
 #include "fbvins/io/imu_state_file.hpp"
+#include "tests/support/no_sensors.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace live_outputs_test {

@@ -4,16 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 #include <utility>
 
-#include "apps/terminal.hpp"
-#include "fbvins/config/option_tiers.hpp"
-
 #ifdef FBVINS_WITH_ROS2
-#include "fbvins/ros2/ros2_control.hpp"
 #include "fbvins/ros2/ros2_image_sink.hpp"
 #include "fbvins/ros2/ros2_node.hpp"
 #include "fbvins/ros2/ros2_sink.hpp"
@@ -25,32 +20,7 @@ namespace {
 
 constexpr std::string_view kSourceKind = "ros2:";
 
-RosParameter parameter_of(const OptionField& field) {
-  RosParameter out{field.path, {}, field.meaning, field.range_text(), field.min, field.max};
-  if (!field.unit.empty()) out.description += " [" + field.unit + "]";
-  if (bool* const* yes = std::get_if<bool*>(&field.value)) out.value = **yes;
-  else if (int* const* whole = std::get_if<int*>(&field.value)) out.value = std::int64_t{**whole};
-  else if (double* const* number = std::get_if<double*>(&field.value)) out.value = **number;
-  else out.value = field.value_text();
-  return out;
-}
-
 }  // namespace
-
-std::vector<RosParameter> ros_parameters(Config config) {
-  const auto users = user_options();
-  std::vector<RosParameter> out;
-  for (const OptionField& field : fields_of(config)) {
-    const bool shown = field.path.starts_with("live.") || std::ranges::find(users, field.path) != users.end();
-    if (shown && !field.is_group()) out.push_back(parameter_of(field));
-  }
-  return out;
-}
-
-std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, const Ros2Options& options) {
-  if (!options.commands) commands.clear();
-  return commands;
-}
 
 bool speaks_as_humble(Ros2Distribution distribution, const char* ros_distro) {
   if (distribution != Ros2Distribution::environment) return distribution == Ros2Distribution::humble;
@@ -85,14 +55,11 @@ Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions& optio
   return std::unique_ptr<Source>(std::move(*source));
 }
 
-Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std::vector<FlightCommand> commands,
-                                 LiveSystem& live) const {
+Result<void> RosGraph::add_sinks(const Source& source, const LiveOptions& options, LiveSystem& live) const {
   if (!publishes_) return {};
-  auto sink = Ros2Sink::create(node_, source.rig(), config.live);
+  auto sink = Ros2Sink::create(node_, source.rig(), options);
   if (!sink) return sink.error();
-  auto control = Ros2Control::create(node_, ros_commands(std::move(commands), config.live.ros2), ros_parameters(config), warn);
-  if (!control) return control.error();
-  auto images = Ros2ImageSink::create(node_, source.rig(), config.live.ros2);
+  auto images = Ros2ImageSink::create(node_, source.rig(), options.ros2);
   if (!images) return images.error();
   if (const auto heard = parse_ros2_topics(topics_); !topics_.empty() && heard) {  // the source subscribes when it runs
     for (const std::string& topic : heard->cameras) (void)node_->quality(topic, {});
@@ -102,7 +69,6 @@ Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std
     return Error{ErrorCode::invalid_argument, fmt::format("live.ros2.qos: this flight has no topic '{}'", topic)};
   live.add_sink(std::move(*sink));
   live.add_sink(std::move(*images));
-  live.add_sink(std::move(*control));
   return {};
 }
 
@@ -115,7 +81,7 @@ Result<RosGraph> RosGraph::join(const std::string& address, const std::string& s
 Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions&) const {
   return Error{ErrorCode::invalid_argument, "this program was built without ROS 2 topics"};
 }
-Result<void> RosGraph::add_sinks(const Source&, const Config&, std::vector<FlightCommand>, LiveSystem&) const { return {}; }
+Result<void> RosGraph::add_sinks(const Source&, const LiveOptions&, LiveSystem&) const { return {}; }
 
 #endif
 

@@ -5,12 +5,8 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
-#include "fbvins/config/config.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/io/ros_services.hpp"
-#include "fbvins/live/flight_command.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/make_source.hpp"
 
@@ -19,12 +15,6 @@ class Ros2Node;
 }
 
 namespace fbvins::app {
-
-/// The options that ROS 2 shows as parameters: those for users (`fbvins config`), and all of `live`.
-std::vector<RosParameter> ros_parameters(Config config);
-
-/// What everybody in the domain may ask of the flight: nothing where the user does not want that (live.ros2.commands).
-std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, const Ros2Options& options);
 
 /// Whether Humble's form of the message that tells of nodes is wanted. `ros_distro`: the environment's ROS_DISTRO, or null.
 bool speaks_as_humble(Ros2Distribution distribution, const char* ros_distro);
@@ -36,8 +26,8 @@ class RosGraph {
 
   bool has_source() const { return !topics_.empty(); }
   Result<std::unique_ptr<Source>> open_source(const SourceOptions& options) const;
-  /// Publishes the flight, and offers the commands as services and the configuration as parameters.
-  Result<void> add_sinks(const Source& source, const Config& config, std::vector<FlightCommand> commands, LiveSystem& live) const;
+  /// Publishes the flight.
+  Result<void> add_sinks(const Source& source, const LiveOptions& options, LiveSystem& live) const;
 
  private:
   std::shared_ptr<Ros2Node> node_;

@@ -125,8 +125,17 @@ Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const S
   if (!arguments.wanted()) return std::unique_ptr<LoopMap>();
   if (!arguments.save.empty())
     if (Result<void> there = check_folder_of(arguments.save); !there) return there.error();
-  return LoopMap::create(
+  auto map = LoopMap::create(
       rig, {.file = arguments.load, .vocabulary = arguments.vocabulary, .boosted = arguments.boosted, .loop = options});
+  if (!map || arguments.load.empty()) return map;
+  const int loaded = (*map)->keyframes();
+  if (loaded == 0)
+    warn(fmt::format("{}: a map without keyframes; of a map that was kept in flight they are in {}.journal, which is to be copied with it",
+                     arguments.load, arguments.load));
+  if (loaded > options.max_keyframes)
+    warn(fmt::format("{}: {} keyframes, and loop.max_keyframes is {}: at the end of the flight the map keeps so many", arguments.load,
+                     loaded, options.max_keyframes));
+  return map;
 }
 
 Result<std::vector<Anchor>> positions_of(const MapArguments& arguments) {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "apps/test_files.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "tests/support/test_files.hpp"
 
 namespace fbvins::app {
 namespace run_output_test {

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <map>
 
-#include "apps/terminal.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/io/no_pose.hpp"
 

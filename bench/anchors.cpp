@@ -7,8 +7,6 @@
 //                                            as well
 #include <fmt/format.h>
 
-#include <cmath>
-#include <memory>
 #include <string_view>
 
 #include "fbvins/calibration/tag_finder.hpp"

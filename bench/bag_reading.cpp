@@ -14,12 +14,12 @@
 #include <fstream>
 #include <string_view>
 
-#include "fbvins/bags/packed_bags.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
+#include "tests/support/packed_bags.hpp"
 
 namespace fbvins {
 namespace {

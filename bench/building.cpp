@@ -25,11 +25,10 @@
 #include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/loop/loop_closer.hpp"
-#include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_journal.hpp"
-#include "fbvins/loop/test_room.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
+#include "tests/support/test_room.hpp"
 
 using namespace fbvins;
 

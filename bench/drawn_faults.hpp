@@ -10,7 +10,7 @@
 
 #include "bench/faulty_tracks.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/faults/sensor_faults.hpp"
 
 namespace fbvins::bench {
 

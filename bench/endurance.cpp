@@ -19,8 +19,8 @@
 #include "bench/synthetic_tracks.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/loop_map.hpp"
-#include "fbvins/loop/test_room.hpp"
 #include "fbvins/pipeline/system.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins::bench {
 namespace {

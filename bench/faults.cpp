@@ -32,9 +32,9 @@
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/eval/alignment.hpp"
+#include "fbvins/faults/sensor_faults.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/live/ingest.hpp"
-#include "fbvins/live/sensor_faults.hpp"
 #include "fbvins/pipeline/system.hpp"
 
 namespace fbvins::bench {

@@ -16,8 +16,8 @@
 
 #include "bench/synthetic_tracks.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/faults/sensor_faults.hpp"
 #include "fbvins/frontend/frontend.hpp"
-#include "fbvins/live/sensor_faults.hpp"
 
 namespace fbvins::bench {
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "fbvins/io/trajectory.hpp"
-#include "fbvins/mocap/hand_eye_scene.hpp"
+#include "tests/support/hand_eye_scene.hpp"
 
 using namespace fbvins;
 

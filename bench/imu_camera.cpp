@@ -11,8 +11,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "fbvins/calibration/imu_camera_scene.hpp"
 #include "fbvins/core/angle.hpp"
+#include "tests/support/imu_camera_scene.hpp"
 
 using namespace fbvins;
 

@@ -8,7 +8,6 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <memory>
 #include <thread>
 
 #include "fbvins/eval/statistics.hpp"

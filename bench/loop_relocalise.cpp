@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/eval/alignment.hpp"

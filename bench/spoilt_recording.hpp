@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "fbvins/doctor/diagnose.hpp"
-#include "fbvins/doctor/setup_faults.hpp"
+#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins::bench {

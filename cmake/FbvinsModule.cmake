@@ -33,6 +33,7 @@ function(fbvins_unit_tests PROGRAM KIND)
   endif()
   add_executable(${PROGRAM} ${ARG_SOURCES})
   target_link_libraries(${PROGRAM} PRIVATE ${ARG_DEPS} fbvins_flags GTest::gtest fbvins_test_main)
+  target_include_directories(${PROGRAM} PRIVATE ${PROJECT_SOURCE_DIR})  # tests/support
   fbvins_use_precompiled(${PROGRAM} test)
   fbvins_use_unity(${PROGRAM})
   gtest_discover_tests(${PROGRAM} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 ${ARG_PROPERTIES})

@@ -24,7 +24,7 @@ PATIENCE_S = 120  # a busy machine
 
 
 class Browser:
-    def __init__(self):
+    def __init__(self, flags=()):
         self.folder = tempfile.TemporaryDirectory()
         theirs_in, self.out = os.pipe()
         self.inward, theirs_out = os.pipe()
@@ -34,7 +34,7 @@ class Browser:
             os.dup2(a, 3)
             os.dup2(b, 4)
 
-        self.process = subprocess.Popen([PROGRAM, *FLAGS, f"--user-data-dir={self.folder.name}", "about:blank"], close_fds=False,
+        self.process = subprocess.Popen([PROGRAM, *FLAGS, *flags, f"--user-data-dir={self.folder.name}", "about:blank"], close_fds=False,
                                         preexec_fn=on_fds, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
         os.close(theirs_in)
         os.close(theirs_out)

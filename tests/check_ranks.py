@@ -19,12 +19,12 @@ RANKS = {
     "frontend": 4, "estimator": 4, "loop": 4, "mocap": 4, "bags": 4, "sim": 4, "calibration": 4,
     "pipeline": 5, "checkup": 5, "boards": 5,
     "live": 6, "doctor": 6,
-    "config": 7, "ros2": 7, "v4l2": 7, "web": 7, "realsense": 7, "flight": 7,
+    "config": 7, "ros2": 7, "v4l2": 7, "web": 7, "realsense": 7, "flight": 7, "faults": 7,
     "report": 8,
     "experiment": 9, "tuning": 9,
 }
 # Modules that make or evaluate data lie in lab/; nothing outside lab/ includes them.
-LABORATORY = {"sim", "boards", "flight", "report", "experiment", "tuning"}
+LABORATORY = {"sim", "boards", "faults", "flight", "report", "experiment", "tuning"}
 # The only includes within a rank (from, to): a camera rig consists of values of types.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')

@@ -123,6 +123,15 @@ class WebInBrowser(unittest.TestCase):
         page.wait_for(f"Number(document.getElementById('clock').dataset.image) === {len(poses(self.run_folder)[1]) - 1}")
         self.check_alone(page, address)
 
+    def test_without_3d_graphics_the_path_is_shown_from_above(self):
+        _, address = self.serve("view", self.run_folder)
+        with Browser(["--disable-3d-apis"]) as flat:
+            page = flat.open(address, **DESKTOP)
+            page.wait_for("document.getElementById('health').dataset.state === 'good'")
+            self.assertFalse(page.value("document.getElementById('no-webgl').hidden"))
+            page.wait_for("""(canvas => [...canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data]
+                             .filter((value, i) => i % 4 === 1 && value > 150).length > 100)(document.getElementById('scene'))""")
+
     def test_a_stranger_is_asked_for_the_token(self):
         _, address = self.serve("view", self.run_folder, FBVINS_WEB_TOKEN="0123456789abcdef")
         page = self.browser.open(address.split("#")[0], **DESKTOP)

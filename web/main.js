@@ -4,7 +4,8 @@ import { CameraView } from "./camera.js";
 import { clearFigures, setVehicle, showMap, showState, showStatus } from "./figures.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
-import { NoScene, Scene } from "./scene.js";
+import { FlatScene } from "./flat_scene.js";
+import { Scene } from "./scene.js";
 import { Stream } from "./stream.js";
 import { Timeline } from "./timeline.js";
 import { STATES, clock, healthSentence } from "./words.js";
@@ -19,16 +20,17 @@ const scene = makeScene();
 let newest_s = -Infinity;  // time of the newest point of the path
 
 function makeScene() {
+  const onGrid = cell => { element("grid-words").textContent = `grid ${cell} m`; };
+  let made;
   try {
-    const made = new Scene(element("scene"),
-      scale => { element("ellipsoid-words").textContent = `position uncertainty, 3σ${scale > 1 ? `, drawn ×${scale}` : ""}`; },
-      cell => { element("grid-words").textContent = `grid ${cell} m`; });
-    made.clear();
-    return made;
+    made = new Scene(element("scene"),
+      scale => { element("ellipsoid-words").textContent = `position uncertainty, 3σ${scale > 1 ? `, drawn ×${scale}` : ""}`; }, onGrid);
   } catch {
     element("no-webgl").hidden = false;
-    return new NoScene();
+    made = new FlatScene(element("scene"), onGrid);
   }
+  made.clear();
+  return made;
 }
 
 function showHealth(state, words, title = STATES[state] ?? "Connecting") {
@@ -84,6 +86,7 @@ const on = {
     element("mark").disabled = !message.can_mark;
     element("mark").hidden = message.replay;
     offer("save-map", message.commands.save_map, "Writes the map after the next keyframe");
+    offer("load-map", message.commands.load_map, "Goes on with the map in the file; what this flight added since is forgotten");
     offer("record", message.commands.start_record, "Begins or ends a flight record");
     offer("reset", message.commands.reset, element("reset").title);
     showHealth("none", "No image has come yet.", "Waiting");
@@ -172,6 +175,7 @@ const player = new Player(stream);
 
 element("mark").addEventListener("click", () => stream.send({ do: "mark", text: "" }));
 element("save-map").addEventListener("click", () => { stream.send({ do: "save_map" }); note("The map will be saved after the next keyframe.", false, false); });
+element("load-map").addEventListener("click", () => { stream.send({ do: "load_map" }); });
 element("record").addEventListener("click", event => stream.send({ do: event.currentTarget.dataset.does ?? "start_record" }));
 element("reset").addEventListener("click", () => {
   element("reset-dialog").returnValue = "";  // that of the time before

@@ -258,10 +258,3 @@ export class Scene {
     });
   }
 }
-
-/// Stands in where the browser has no WebGL.
-export class NoScene {
-  constructor() {
-    for (const name of ["clear", "addPath", "pathChanged", "showWhole", "showPose", "showKeyframes", "showMapped", "showPoints", "fit"]) this[name] = () => {};
-  }
-}

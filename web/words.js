@@ -30,12 +30,11 @@ export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAl
 
 export function healthSentence(state) {
   const without = state.without_cameras ?? [];
-  const covered = (state.covered_percent ?? []).map((percent, camera) => (percent > 0 ? ` Camera ${camera} is covered by ${percent} %.` : "")).join("");
   const scale = state.scale_sigma > 0 ? ` Scale known to ±${(300 * state.scale_sigma).toFixed(1)} % (3σ).` : "";
   const why = reasonWords(state.reason) + (without.length ? `, without camera ${without.join(", ")}` : "");
   switch (state.health) {
-    case "good": return `Position known to ±${length(3 * state.sigma_m)} (3σ).${scale}${covered}`;
-    case "degraded": return `${sentence(why || "worse than it could be")} Position ±${length(3 * state.sigma_m)} (3σ).${scale}${covered}`;
+    case "good": return `Position known to ±${length(3 * state.sigma_m)} (3σ).${scale}`;
+    case "degraded": return `${sentence(why || "worse than it could be")} Position ±${length(3 * state.sigma_m)} (3σ).${scale}`;
     case "lost": return `${sentence(why || "no trustworthy pose")} There is no pose; it starts again.`;
     default: return sentence(why || "no pose yet");
   }

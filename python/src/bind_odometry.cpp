@@ -4,7 +4,6 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <bit>
 #include <limits>
 
 #include "bindings.hpp"
@@ -51,11 +50,10 @@ using OdometryState = std::tuple<std::vector<std::int64_t>, std::vector<double>>
 
 OdometryState state_of(Odometry& o) {
   const EstimatorStats& s = o.stats;
-  OdometryState out{
-      {o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason), o.health.without_cameras,
-       std::bit_cast<std::int64_t>(o.health.covered_percent), o.reset_counter, s.frames_in_window, s.landmarks, s.known_landmarks,
-       s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
-      {}};
+  OdometryState out{{o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason),
+                     o.health.without_cameras, o.reset_counter, s.frames_in_window, s.landmarks, s.known_landmarks,
+                     s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
+                    {}};
   each_number(o, [&](double x) { std::get<1>(out).push_back(x); });
   return out;
 }
@@ -68,7 +66,6 @@ void set_state(Odometry& self, const OdometryState& state) {
   self.id = FrameId{next()}, self.t = Time{next()}, self.level = next() != 0;
   self.health.state = static_cast<HealthState>(next()), self.health.reason = static_cast<HealthReason>(next());
   self.health.without_cameras = static_cast<std::uint8_t>(next());
-  self.health.covered_percent = std::bit_cast<decltype(self.health.covered_percent)>(next());
   self.reset_counter = static_cast<std::uint32_t>(next());
   EstimatorStats& s = self.stats;
   for (int* count : {&s.frames_in_window, &s.landmarks, &s.known_landmarks, &s.observations, &s.iterations, &s.outliers})
@@ -115,9 +112,6 @@ void bind_pose(nb::module_& m) {
       .def_prop_ro(
           "without_cameras", [](const Odometry& o) { return cameras_in(o.health.without_cameras); },
           "numbers of the cameras that deliver nothing or contradict the others, and are not used")
-      .def_prop_ro(
-          "covered_percent", [](const Odometry& o) { return covered_percent_of(o.health); },
-          "per cent of the cameras' images that something on the lens covers, up to the last camera of which any is")
       .def_ro("level", &Odometry::level, "whether the tilt is known to 0.3 degrees")
       .def_prop_ro("tilt_sigma_rad", [](const Odometry& o) { return o.health.has_pose() ? o.tilt_sigma_rad : kNaN; })
       .def_prop_ro(

@@ -116,8 +116,8 @@ def test_wrong_arguments_are_refused_with_a_message(flight, tmp_path):
 
 
 def test_options_reach_the_estimator(flight):
-    config = fbvins.config(options={"estimator": {"max_iterations": 3}, "frontend.kind": "orb", "frontend.orb.subpixel": False})
-    assert config["estimator.max_iterations"] == 3 and config["frontend.orb.subpixel"] is False
+    config = fbvins.config(options={"estimator": {"max_iterations": 3}, "frontend.kind": "orb", "frontend.orb.recognition.enabled": False})
+    assert config["estimator.max_iterations"] == 3 and config["frontend.orb.recognition.enabled"] is False
     assert "max_iterations: 3" in config.to_yaml() and "frontend.kind" in config.keys()
     with pytest.raises(KeyError, match="max_iterations"):
         config["estimator.max_iteration"]

@@ -9,11 +9,11 @@
 
 #include "fbvins/flight/mission.hpp"
 #include "fbvins/io/little_endian.hpp"
-#include "fbvins/mocap/marker_test_files.hpp"
 #include "fbvins/mocap/motion_capture.hpp"
 #include "fbvins/tuning/loop_log.hpp"
 #include "fbvins/tuning/ulog.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
+#include "tests/support/marker_test_files.hpp"
 
 namespace fbvins::test {
 namespace broken_flight_files_test {

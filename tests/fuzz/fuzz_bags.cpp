@@ -7,7 +7,6 @@
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/foreign_calibration.hpp"
-#include "fbvins/bags/packed_bags.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -21,6 +20,7 @@
 #include "tests/fuzz/fuzz_targets.hpp"
 #include "tests/fuzz/named_file.hpp"
 #include "tests/fuzz/require.hpp"
+#include "tests/support/packed_bags.hpp"
 
 namespace fbvins::fuzz {
 namespace {

@@ -17,11 +17,11 @@
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/io/yaml_reader.hpp"
-#include "fbvins/mocap/marker_test_files.hpp"
 #include "fbvins/mocap/motion_capture.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 #include "tests/fuzz/named_file.hpp"
 #include "tests/fuzz/require.hpp"
+#include "tests/support/marker_test_files.hpp"
 
 namespace fbvins::fuzz {
 namespace {

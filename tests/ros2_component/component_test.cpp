@@ -4,10 +4,10 @@
 
 #include <thread>
 
-#include "fbvins/io/kalibr_test_files.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "ros2/src/fbvins_component.cpp"
-#include "tests/rendered_recording.hpp"
+#include "tests/support/kalibr_test_files.hpp"
+#include "tests/support/rendered_recording.hpp"
 
 namespace fbvins {
 namespace component_test {

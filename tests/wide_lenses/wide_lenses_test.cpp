@@ -11,7 +11,7 @@
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/pipeline/system.hpp"
 #include "fbvins/sim/simulation.hpp"
-#include "tests/rendered_recording.hpp"
+#include "tests/support/rendered_recording.hpp"
 
 namespace fbvins {
 namespace wide_lenses_test {

@@ -59,13 +59,8 @@ class Camera {
   double focal_px() const;
 
   /// What of the image shows something else than the world, of the camera's size (check_rig); null where all of it does.
-  const std::shared_ptr<const Mask>& mask() const { return shared_mask_ ? *shared_mask_ : mask_; }
-  void set_mask(std::shared_ptr<const Mask> mask) {
-    mask_ = std::move(mask);
-    shared_mask_.reset();
-  }
-  /// The mask of this camera and its copies is what its owner sets between images, from the thread that uses them.
-  void share_mask(std::shared_ptr<const std::shared_ptr<const Mask>> mask) { shared_mask_ = std::move(mask); }
+  const std::shared_ptr<const Mask>& mask() const { return mask_; }
+  void set_mask(std::shared_ptr<const Mask> mask) { mask_ = std::move(mask); }
   /// What it has more than its rig says of all cameras (StereoRig::times). A rig's camera 0 has nothing more.
   const CameraTimes& own_times() const { return own_times_; }
   void set_own_times(const CameraTimes& more) { own_times_ = more; }
@@ -118,7 +113,6 @@ class Camera {
   Mat3 R_lens_ = Mat3::Identity();
   bool is_turned_ = false;
   std::shared_ptr<const Mask> mask_;
-  std::shared_ptr<const std::shared_ptr<const Mask>> shared_mask_;  ///< null: mask_
   CameraTimes own_times_;
 };
 

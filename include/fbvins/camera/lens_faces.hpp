@@ -10,9 +10,7 @@
 // Immutable; any thread.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <vector>
 
@@ -50,8 +48,6 @@ class LensFaces {
   Calibration of_lenses(Calibration calibration) const;
   /// Bits of cameras of rig() as bits of their lenses (Health::without_cameras).
   std::uint8_t lenses_of(std::uint8_t cameras) const;
-  /// Of each lens's image the share that is covered, in per cent rounded up, of pixels in the images of the cameras of rig().
-  std::array<std::uint8_t, kMostCameras> covered_percent(const std::function<int(int camera)>& covered_px) const;
 
  private:
   std::shared_ptr<const Image> part(const std::shared_ptr<const Image>& image, int camera) const;

@@ -12,9 +12,6 @@ namespace fbvins {
 /// Which keyframe leaves a full window.
 enum class KeyframeLeaving { oldest, entropy };
 
-/// Whether the direction of gravity in W is a state of the window, or W is level by definition (docs/derivations/window.md).
-enum class UpDirection { state, fixed };
-
 struct KeyframeOptions {
   int max_keyframes = 8;
   int newest_frames = 3;
@@ -39,7 +36,7 @@ struct KnownLandmarkOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("enabled", enabled, "", "re-observed landmarks constrain the window; not while up is fixed");
+    v("enabled", enabled, "", "re-observed landmarks constrain the window");
     v("position_sigma_m", position_sigma_m, "m",
       "standard deviation of a remembered landmark's position, in addition to that of its triangulation", 1e-4, 1.0);
   }
@@ -65,7 +62,6 @@ struct EstimatorOptions {
   KeyframeOptions keyframes;
   KnownLandmarkOptions known_landmarks;
   StandingOptions standing;
-  UpDirection up = UpDirection::state;
   int max_iterations = 4;
   int max_landmarks = 300;
   double gravity_mps2 = 9.81;
@@ -102,8 +98,6 @@ struct EstimatorOptions {
     v.group("keyframes", keyframes, "the sliding window");
     v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
     v.group("standing", standing, "a vehicle that stands level before it flies");
-    v("up", up, "state|fixed",
-      "state: the direction of gravity in W is estimated; fixed: W is level and turns as gravity becomes better known");
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);

@@ -17,21 +17,15 @@ struct RecognitionOptions {
 };
 
 struct OrbFrontendOptions {
-  /// Tracks are followed from image to image by patch alignment; keypoints are extracted from some images only.
-  bool follows_patches() const { return subpixel && fill_in && !examine_all; }
-
   int max_features = 180;
   int max_keypoints = 400;
   double min_distance_px = 14;
   double memory_s = 1.0;  ///< how long a feature that is not observed is searched for at its predicted position; set by tests
   double search_px = 12;  ///< radius around a prediction from the estimator's state; set by tests
-  bool subpixel = true;
-  bool fill_in = true;
-  bool examine_all = false;
   double epipolar_px = 1.0;
   double sigma_px = 0.6;
   double min_depth_m = 0.35;
-  double stereo_epipolar_px = 1.5;  ///< largest distance of a descriptor match from the right epipolar line; set by tests
+  double stereo_epipolar_px = 1.5;  ///< largest distance of a match from the right epipolar line; set by tests
   RecognitionOptions recognition = {};
 
   template <class V>
@@ -40,10 +34,6 @@ struct OrbFrontendOptions {
       "features followed at once by a pair of cameras; two pairs share a third more, three or more twice as many", 10, 2000);
     v("max_keypoints", max_keypoints, "", "keypoints extracted from one image, as candidates for tracks", 10, 10000);
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
-    v("subpixel", subpixel, "", "refine matched positions by patch alignment");
-    v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
-    v("examine_all", examine_all, "",
-      "match descriptors in every image, and left to right (paper 2.2.3), instead of in one of four, with patches between");
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
     v("min_depth_m", min_depth_m, "m", "smallest depth that is searched for in the right image", 0.05, 10.0);

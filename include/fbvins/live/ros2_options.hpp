@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of the ROS 2 topics and services: `live.ros2` in a configuration (docs/ros2.md).
+// Options of the ROS 2 topics: `live.ros2` in a configuration (docs/ros2.md).
 #pragma once
 
 #include <string>
@@ -25,7 +25,6 @@ struct Ros2Options {
   Ros2Clock clock = Ros2Clock::sensors;
   Ros2Distribution distribution = Ros2Distribution::environment;
   bool publish_tf = true;
-  bool commands = true;
   std::string qos = {};
 
   template <class V>
@@ -41,8 +40,6 @@ struct Ros2Options {
       "ROS's distribution whose tools show the node; iron: that and all later ones; environment: as ROS_DISTRO says");
     v("publish_tf", publish_tf, "",
       "false where another node, such as a filter, publishes the transform from the odometry's frame to the vehicle's");
-    v("commands", commands, "",
-      "whether all in the domain may reset the estimator, save and load the map, and record, by services");
     v("qos", qos, "",
       "other qualities of service: TOPIC=SETTING/SETTING..., separated by commas; settings are reliable, best_effort, transient_local, "
       "volatile and the length of the queue");

@@ -2,7 +2,6 @@
 // What the estimator publishes.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -52,18 +51,14 @@ struct Health {
   HealthState state = HealthState::initialising;
   HealthReason reason = HealthReason::none;
   std::uint8_t without_cameras = 0;  ///< bit c: camera c, which delivers nothing or contradicts the others, is not used
-  std::array<std::uint8_t, 8> covered_percent =
-      {};  ///< of each camera's image, by what was found in flight: dirt, a leg; rounded up
 
   bool has_pose() const { return state == HealthState::good || state == HealthState::degraded; }
   bool operator==(const Health&) const = default;
 };
-/// In one sentence: "good", "degraded: one_camera, without camera 1", "good, camera 0 covered by 4 %".
+/// In one sentence: "good", "degraded: one_camera, without camera 1".
 std::string to_sentence(const Health& health);
 /// The numbers of Health::without_cameras.
 std::vector<int> cameras_in(std::uint8_t bits);
-/// Health::covered_percent of the cameras up to the last one that is covered; empty where none is.
-std::vector<int> covered_percent_of(const Health& health);
 
 struct EstimatorStats {
   int frames_in_window = 0;

@@ -2,7 +2,6 @@
 // What the frontend gives the estimator, and the two values that are fed back.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -98,7 +97,6 @@ struct TrackedFrame {
   StereoFrame images;                                ///< null unless keyframes are wanted, which carry the images
   std::shared_ptr<const DepthImage> depth = {};      ///< of a rig with a depth sensor
   ExposureOffsets offsets = {};                      ///< of the cameras' images; filled by the system
-  std::array<std::uint8_t, 8> covered_percent = {};  ///< as in Health; filled by the system
   std::vector<Anchor> anchors = {};                  ///< for the map
   bool after_clock_step = false;                     ///< as in StereoFrame; filled by the system
 };

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
-#include <sstream>
 
 #include "fbvins/experiment/bench_results.hpp"
 #include "fbvins/experiment/bench_runner.hpp"

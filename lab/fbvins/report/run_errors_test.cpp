@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/report/test_run.hpp"
+#include "tests/support/test_run.hpp"
 
 namespace fbvins {
 namespace run_errors_test {

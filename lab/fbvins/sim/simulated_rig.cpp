@@ -4,7 +4,6 @@
 
 #include <initializer_list>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "fbvins/core/angle.hpp"

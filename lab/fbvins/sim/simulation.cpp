@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/imu_file.hpp"

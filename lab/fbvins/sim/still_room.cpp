@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/sim/still_room.hpp"
 
-#include <cmath>
-
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/sim/flight_recorder.hpp"

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "fbvins/core/angle.hpp"
 
 namespace fbvins {

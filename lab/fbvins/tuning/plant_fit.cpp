@@ -7,7 +7,6 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <optional>
 
 namespace fbvins {
 namespace {

@@ -11,11 +11,11 @@
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/decompress.hpp"
-#include "fbvins/bags/packed_bags.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/io/flight_record.hpp"
+#include "tests/support/packed_bags.hpp"
 
 namespace fbvins {
 namespace cut_bags_test {

@@ -23,7 +23,6 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
-#include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/side_by_side.hpp"
 #include "fbvins/io/mcap_dataset.hpp"

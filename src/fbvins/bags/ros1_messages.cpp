@@ -9,7 +9,6 @@
 
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/io/little_endian.hpp"
-#include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_messages.hpp"
 
 namespace fbvins::ros1 {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/calibration/flight_piece.hpp"
-#include "fbvins/calibration/flight_scene.hpp"
+#include "tests/support/flight_scene.hpp"
 
 namespace fbvins {
 namespace flight_calibration_test {

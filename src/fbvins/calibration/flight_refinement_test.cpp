@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "fbvins/calibration/flight_calibration.hpp"
-#include "fbvins/calibration/flight_scene.hpp"
 #include "fbvins/core/angle.hpp"
+#include "tests/support/flight_scene.hpp"
 
 namespace fbvins {
 namespace flight_refinement_test {

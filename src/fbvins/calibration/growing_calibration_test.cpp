@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/calibration/imu_camera_scene.hpp"
 #include "fbvins/calibration/simulated_board.hpp"
+#include "tests/support/imu_camera_scene.hpp"
 
 namespace fbvins {
 namespace growing_calibration_test {

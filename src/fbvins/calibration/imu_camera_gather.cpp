@@ -7,7 +7,6 @@
 #include <cmath>
 #include <map>
 
-#include "fbvins/calibration/detections_file.hpp"
 #include "fbvins/calibration/imu_camera_poses.hpp"
 #include "fbvins/calibration/refused.hpp"
 #include "fbvins/core/angle.hpp"

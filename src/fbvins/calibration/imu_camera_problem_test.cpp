@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "fbvins/calibration/imu_camera_scene.hpp"
+#include "tests/support/imu_camera_scene.hpp"
 
 namespace fbvins {
 namespace imu_camera_problem_test {

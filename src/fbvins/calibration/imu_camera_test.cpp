@@ -6,9 +6,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "fbvins/calibration/imu_camera_scene.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/median.hpp"
+#include "tests/support/imu_camera_scene.hpp"
 
 namespace fbvins {
 namespace imu_camera_test {

@@ -7,8 +7,8 @@
 #include <Eigen/Cholesky>
 
 #include "fbvins/calibration/imu_camera.hpp"
-#include "fbvins/calibration/imu_camera_scene.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
+#include "tests/support/imu_camera_scene.hpp"
 
 namespace fbvins {
 namespace rig_variations_test {

@@ -5,10 +5,10 @@
 
 #include <Eigen/Dense>
 
-#include "fbvins/calibration/imu_camera_scene.hpp"
 #include "fbvins/calibration/lens_certainty.hpp"
 #include "fbvins/calibration/residual_summary.hpp"
 #include "fbvins/calibration/simulated_board.hpp"
+#include "tests/support/imu_camera_scene.hpp"
 
 namespace fbvins {
 namespace weak_parts_test {

@@ -202,15 +202,4 @@ std::uint8_t LensFaces::lenses_of(std::uint8_t cameras) const {
   return static_cast<std::uint8_t>(out);
 }
 
-std::array<std::uint8_t, kMostCameras> LensFaces::covered_percent(const std::function<int(int camera)>& covered_px) const {
-  std::array<double, kMostCameras> percent{};
-  for (int i = 0; i < rig_.camera_count(); ++i) {
-    const Camera& lens = lenses_.camera(lens_of(i));
-    percent[static_cast<std::size_t>(lens_of(i))] += 100.0 * covered_px(i) / (1.0 * lens.width() * lens.height());
-  }
-  std::array<std::uint8_t, kMostCameras> out{};
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<std::uint8_t>(std::min(100.0, std::ceil(percent[i])));
-  return out;
-}
-
 }  // namespace fbvins

@@ -163,18 +163,6 @@ TEST(LensFaces, KeepTheNumbersOfTheRigsCameras) {
   EXPECT_EQ(faces.spread(frame).image(3), nullptr);
 }
 
-/// Of the lens's image, whatever number of cameras it is cut into; rounded up, so that what is covered is never zero.
-TEST(LensFaces, WhatCoversThemIsAShareOfTheirLens) {
-  const Camera wide = wide_lenses()[0], narrow(PinholeRadtan{460, 460, 376, 240, 0, 0, 0, 0}, 752, 480);
-  const LensFaces faces(rig_of(wide, narrow));  // cameras 0, 2, 3 and 4 are of the first lens
-  const std::array<int, 5> covered_px = {5000, 752 * 48, 5000, 0, 1};
-  const auto percent = faces.covered_percent([&](int camera) { return covered_px[static_cast<std::size_t>(camera)]; });
-  EXPECT_EQ(percent[0], 4) << "10,001 of 262,144 pixels are 3.8 per cent";
-  EXPECT_EQ(percent[1], 10);
-  EXPECT_EQ(percent[2], 0) << "the rig has two lenses";
-  EXPECT_EQ(faces.covered_percent([](int) { return 0; }), decltype(percent){});
-}
-
 TEST(LensFaces, KeepAllRowsOfARollingShutter) {
   StereoRig rig = rig_of(wide_lenses()[0], wide_lenses()[0]);
   rig.line_delay_s = 2e-5;

@@ -14,8 +14,8 @@
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace checkup_test {

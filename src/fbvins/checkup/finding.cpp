@@ -37,7 +37,6 @@ std::string_view to_string(FindingKind kind) {
     case FindingKind::baseline_direction: return "baseline_direction";
     case FindingKind::baseline_length: return "baseline_length";
     case FindingKind::epipolar_error: return "epipolar_error";
-    case FindingKind::no_stereo: return "no_stereo";
     case FindingKind::calibration_size: return "calibration_size";
     case FindingKind::focal_length: return "focal_length";
     case FindingKind::principal_point: return "principal_point";

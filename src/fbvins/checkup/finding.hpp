@@ -44,7 +44,6 @@ enum class FindingKind {
   baseline_direction,
   baseline_length,
   epipolar_error,
-  no_stereo,
   // a lens
   calibration_size,
   focal_length,

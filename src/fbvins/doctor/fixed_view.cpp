@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "fbvins/frontend/fixed_edges.hpp"
+#include "fbvins/doctor/fixed_edges.hpp"
 
 namespace fbvins {
 namespace {
@@ -17,8 +17,10 @@ constexpr std::size_t kMostViews = 96;
 /// Of the gyroscope, which is not known yet: the turn of a rig that hovers for seconds from one view to the next may be nothing
 /// else. More is a finding of its own.
 constexpr double kMostBias_radps = 0.1;
-/// At half their size, in the whole recording.
-constexpr FixedEdgeRule kRule{};
+/// Of the image: less is nothing to tell, more is an image that does not move.
+constexpr double kLeastFixedShare = 0.002, kMostFixedShare = 0.6;
+/// What is found so near to an existing mask is the edge of the same thing, masked by hand a little too small.
+constexpr double kBesideMask_px = 12;
 
 std::shared_ptr<const Image> half_of(const Pyramid& pyramid) {
   if (pyramid.levels() < 2) return nullptr;
@@ -87,13 +89,13 @@ void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const P
   stride_ *= 2;
 }
 
-bool FixedInView::judged() const { return pairs >= kRule.fewest_pairs; }
+bool FixedInView::judged() const { return pairs >= kFewestPairs; }
 
 FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
   FixedInView out;
   const int cameras = evidence.rig.has_right() ? 2 : 1;
   std::vector<FixedEdges> fixed;
-  for (int side = 0; side < cameras; ++side) fixed.emplace_back(evidence.rig.camera(side), kRule);
+  for (int side = 0; side < cameras; ++side) fixed.emplace_back(evidence.rig.camera(side));
   std::vector<const SmallView*> views;
   for (const SmallView& view : evidence.views)
     if (view.left && (view.right || cameras == 1)) views.push_back(&view);
@@ -114,8 +116,7 @@ FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
     } else {
       moved_px.setZero();
     }
-    out.pairs +=
-        moved_px.norm() > kRule.across_px && evidence.rig.left.focal_px() * (turned_rad.norm() - by_bias_rad) > kRule.across_px;
+    out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left.focal_px() * (turned_rad.norm() - by_bias_rad) > kAcross_px;
     for (int side = 0; side < cameras; ++side)
       fixed[static_cast<std::size_t>(side)].add({side == 0 ? views[i]->left : views[i]->right, moved_px.cast<float>(),
                                                  Vec3(evidence.rig.T_BC(side).q.conjugate() * turned_rad).cast<float>(),

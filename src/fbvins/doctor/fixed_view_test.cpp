@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "fbvins/doctor/imu_series.hpp"
-#include "fbvins/features/noise_texture.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace fixed_view_test {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "fbvins/doctor/synthetic_evidence.hpp"
+#include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
 namespace gyro_fit_test {

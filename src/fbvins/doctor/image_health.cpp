@@ -5,12 +5,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 
 #include "fbvins/checkup/projector_dots.hpp"
-#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

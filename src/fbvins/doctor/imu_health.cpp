@@ -9,8 +9,6 @@
 #include <numbers>
 #include <vector>
 
-#include "fbvins/imu/nav_state.hpp"
-
 namespace fbvins {
 namespace {
 

@@ -16,8 +16,8 @@
 #include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/doctor/motion_problem.hpp"
 #include "fbvins/doctor/stereo_step.hpp"
-#include "fbvins/doctor/synthetic_evidence.hpp"
 #include "fbvins/imu/propagation.hpp"
+#include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
 namespace parts_test {

@@ -79,7 +79,7 @@ TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
   SimulatedFlight flight(Motion(0.6, 0.5), 48);
   const Calibration calibrated{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
   const CalibrationPrior sigmas;
-  const WindowPrior prior = with_calibration_prior(first_frame_prior(NavState<G>{}, unknown_biases(), true), sigmas, calibrated);
+  const WindowPrior prior = with_calibration_prior(first_frame_prior(NavState<G>{}, unknown_biases()), sigmas, calibrated);
   ASSERT_EQ(prior.quadratic.size(), kTiltSize + kCalibrationSize + 15);
   const auto cost = [&](const StereoRig& rig) {
     Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());

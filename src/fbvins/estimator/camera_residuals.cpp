@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "fbvins/core/median.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
 
 namespace fbvins {
 namespace {
@@ -41,7 +42,7 @@ ResidualMedians camera_residuals(const std::vector<LandmarkObservation>& observa
       residuals.push_back(r.norm()), x.push_back(r.x()), y.push_back(r.y());
       out.focal = o->sqrt_information(0, 0);
     }
-    if (residuals.size() < kFewestLandmarks) continue;
+    if (residuals.size() < thresholds::kFewestToJudge) continue;
     out.norm[static_cast<std::size_t>(c)] = median(residuals);
     out.shift[static_cast<std::size_t>(c)] = Vec2(median(x), median(y));
   }

@@ -11,9 +11,6 @@
 
 namespace fbvins {
 
-/// Landmarks in an image without which it proves nothing, for a camera and for a pose.
-inline constexpr std::size_t kFewestLandmarks = 15;
-
 /// Medians over a camera's landmarks, in standard deviations of a feature.
 struct ResidualMedians {
   std::array<std::optional<double>, kMostCameras> norm;  ///< of the residuals' norms; none with few landmarks

@@ -154,7 +154,7 @@ void Estimator::open_window(const InitialSolution& start) {
   for (std::size_t i = 0; i < start.frames.size(); ++i)
     window_.add_frame(frame_of_start(start, i, imu_noise_), start.frames[i].features, calibration_);
   const NavState<G>& first = window_.frames().oldest().state;
-  WindowPrior prior = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
+  WindowPrior prior = first_frame_prior(first, start.biases);
   if (weights_of(options_).calibrating()) prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
   window_.set_prior(std::move(prior));
   published_.restart();

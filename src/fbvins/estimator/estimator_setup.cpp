@@ -14,7 +14,6 @@ WindowWeights weights_of(const EstimatorOptions& o, bool images_show_scale) {
   WindowWeights w;
   w.images_show_scale = images_show_scale;
   w.gravity_mps2 = o.gravity_mps2;
-  w.estimate_tilt = o.up == UpDirection::state;
   w.estimate_extrinsics = o.estimate_extrinsics;
   w.estimate_time_offset = o.estimate_time_offset;
   w.estimate_line_delay = o.estimate_line_delay;

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// The gauge: position and heading of the first frame are chosen; also its roll and pitch, where the tilt of G is estimated.
+/// The gauge: position and heading of the first frame are chosen; also its roll and pitch, as the tilt of G is estimated.
 constexpr double kChosenSigma = 1e-3, kLevelSigma = 1e-4;  // m and rad
 /// Weak priors of the other variables.
 constexpr double kTiltSigma_rad = 0.5;
@@ -38,7 +38,7 @@ ImuBiasEstimate unknown_biases() {
           kAccelBiasSigma_mps2 * kAccelBiasSigma_mps2 * Mat3::Identity()};
 }
 
-WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& biases, bool estimate_tilt) {
+WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& biases) {
   WindowPrior prior;
   prior.frames = {0};
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
@@ -49,13 +49,13 @@ WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& b
   prior.quadratic.H.block<3, 3>(nav::ba, nav::ba) = biases.accel_covariance.inverse();
   // Heading is about the vertical of the start, which in B is R^T z.
   const Vec3 up_B = state.T_FB.R().transpose() * Vec3::UnitZ();
-  const double level = information(estimate_tilt ? kLevelSigma : kTiltSigma_rad), heading = information(kChosenSigma);
+  const double level = information(kLevelSigma), heading = information(kChosenSigma);
   prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = level * Mat3::Identity() + (heading - level) * up_B * up_B.transpose();
   Vec15 from_mean = Vec15::Zero();
   from_mean.tail<6>() << state.bias.gyro_radps - biases.bias.gyro_radps, state.bias.accel_mps2 - biases.bias.accel_mps2;
   prior.quadratic = shifted(std::move(prior.quadratic), from_mean);
-  prior.with_tilt = estimate_tilt;
-  if (estimate_tilt) prior.quadratic = inserted(prior.quadratic, 0, information(kTiltSigma_rad) * Mat2::Identity());
+  prior.with_tilt = true;
+  prior.quadratic = inserted(prior.quadratic, 0, information(kTiltSigma_rad) * Mat2::Identity());
   return prior;
 }
 

@@ -21,10 +21,10 @@ struct CalibrationPrior {
 /// Biases of an unknown IMU: zero, with a wide covariance.
 ImuBiasEstimate unknown_biases();
 
-/// Prior of the first frame: position and heading are fixed as the gauge, biases as given, velocity and tilt almost free: the
-/// tilt of G where that is estimated, else that of the frame. The initial solution is the optimiser's starting point, not
+/// Prior of the first frame: position and heading are fixed as the gauge, biases as given, velocity and the
+/// tilt of G almost free. The initial solution is the optimiser's starting point, not
 /// the prior's mean: it was made from measurements that are in the window.
-WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& biases, bool estimate_tilt);
+WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& biases);
 
 /// Inserts the prior of the calibration before that of the first frame: its mean is `calibrated`, its standard deviations are
 /// those given. The pose between the cameras is constrained far more tightly than that to the IMU: it determines the scale.

@@ -102,7 +102,7 @@ inline constexpr double kProven_s = 1;
 /// Landmarks that join one image to an earlier one, and how many of those in view they have to be. Chosen.
 inline constexpr std::size_t kFewestLinked = 8;
 inline constexpr double kLinked = 0.5;
-/// Fewer landmarks prove nothing: as of a camera in (I2).
+/// Fewer landmarks in an image prove nothing: as of a camera, and for a pose (I2).
 inline constexpr std::size_t kFewestToJudge = 15;
 inline constexpr double kCarriedFor_s = 30;  ///< chosen
 /// No good velocity is off by more; and by so many standard deviations of what is carried on.

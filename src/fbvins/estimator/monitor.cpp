@@ -102,7 +102,7 @@ void Monitor::take(const BiasEstimate& biases) { hopeless_ = tilt_.take(biases, 
 Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
                                 const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
   Verdict out;
-  if (observations.size() < kFewestLandmarks) {
+  if (observations.size() < kFewestToJudge) {
     blind(dt);
     return out;
   }

@@ -188,7 +188,7 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
   const std::vector<LeavingLandmark> leaving = landmarks_leaving_with(problem, index, newest_begin);
   Marginalised marginalised = marginalise_frame(problem, index, leaving, leaving_.memory);
   remember(problem, leaving, marginalised.landmark_information);
-  for (const LeavingLandmark& l : leaving) remember_before_removal(problem, l, newest_begin, calibration);
+  for (const LeavingLandmark& l : leaving) keep_newest_observations(problem, l, newest_begin, calibration);
   if (index + 1 < frames_.size()) frames_[index + 1].imu.reset();
   landmarks_.remove_unseen();
   forget_observations(id, calibration);
@@ -197,8 +197,8 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
 }
 
 /// Its observations by keyframes are in the prior; those by the newest frames start it anew.
-void SlidingWindow::remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
-                                            const Calibration& calibration) {
+void SlidingWindow::keep_newest_observations(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
+                                             const Calibration& calibration) {
   Landmark& landmark = *landmarks_.find(problem.landmarks[leaving.index].id);
   std::erase_if(landmark.observations,
                 [&](const StereoObservation& s) { return !leaving.in_view || frames_.index_of(s.frame) < newest_begin; });

@@ -69,16 +69,14 @@ class SlidingWindow {
   const KnownLandmarks& known() const { return known_; }
 
  private:
-  /// Not with UpDirection::fixed: there G turns as gravity becomes better known, and remembered positions would be wrong.
-  bool remembers_landmarks() const { return options_.known_landmarks.enabled && weights_.estimate_tilt; }
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);
   void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
   void forget_observations(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);
   void remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving, std::span<const Mat3> information);
-  void remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
-                               const Calibration& calibration);
+  void keep_newest_observations(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
+                                const Calibration& calibration);
 
   /// Working memory of marginalise_keyframe() and drop_frame().
   struct Leaving {

@@ -91,7 +91,7 @@ void SlidingWindow::drop_prior(Landmark& landmark) {
 /// Those still in view are constrained by the remembered position at once.
 void SlidingWindow::remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving,
                              std::span<const Mat3> information) {
-  if (!remembers_landmarks()) return;
+  if (!options_.known_landmarks.enabled) return;
   for (std::size_t k = 0; k < leaving.size(); ++k) {
     const WindowLandmark& numbers = problem.landmarks[leaving[k].index];
     Landmark& landmark = *landmarks_.find(numbers.id);

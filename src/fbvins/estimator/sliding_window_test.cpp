@@ -293,21 +293,6 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreRemembered) {
   EXPECT_EQ(s.window.refuse_landmark_priors(s.fill_problem()), 0);
 }
 
-TEST(SlidingWindow, RemembersNoLandmarksWhereUpIsFixed) {
-  Scene s;
-  WindowWeights level;
-  level.estimate_tilt = false;
-  s.window = SlidingWindow(EstimatorOptions{}, level);
-  for (int k = 0; k < 5; ++k) s.add(k, s.all(k), k < 2);
-  WindowPrior prior;
-  prior.frames = {0};
-  prior.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(15, 15);
-  prior.quadratic.g = Eigen::VectorXd::Zero(15);
-  s.window.set_prior(std::move(prior));
-  s.window.marginalise_keyframe(0, s.calibration);
-  EXPECT_EQ(s.window.known().size(), 0u);
-}
-
 TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   Scene s = about_to_shrink();
   s.window.marginalise_keyframe(0, s.calibration);

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/eval/eval_test_trajectories.hpp"
 #include "fbvins/eval/evaluation.hpp"
+#include "tests/support/eval_test_trajectories.hpp"
 
 namespace fbvins {
 namespace alignment_test {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/eval/eval_test_trajectories.hpp"
+#include "tests/support/eval_test_trajectories.hpp"
 
 namespace fbvins {
 namespace association_test {

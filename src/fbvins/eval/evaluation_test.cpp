@@ -5,7 +5,7 @@
 
 #include <type_traits>
 
-#include "fbvins/eval/eval_test_trajectories.hpp"
+#include "tests/support/eval_test_trajectories.hpp"
 
 namespace fbvins {
 namespace evaluation_test {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "fbvins/eval/eval_test_trajectories.hpp"
+#include "tests/support/eval_test_trajectories.hpp"
 
 namespace fbvins {
 namespace nees_test {

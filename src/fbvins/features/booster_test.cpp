@@ -12,9 +12,9 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/features/booster_network.hpp"
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/features/orb.hpp"
 #include "fbvins/features/safetensors.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace booster_test {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/features/shi_tomasi.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace klt_test {

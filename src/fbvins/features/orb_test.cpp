@@ -10,8 +10,8 @@
 
 #include "fbvins/features/descriptor_stage.hpp"
 #include "fbvins/features/hamming.hpp"
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/features/orb_pattern.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace orb_test {

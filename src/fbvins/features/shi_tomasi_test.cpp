@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "fbvins/features/noise_texture.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace shi_tomasi_test {

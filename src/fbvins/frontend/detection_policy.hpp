@@ -2,7 +2,7 @@
 // Decides in which images keypoints are detected and matched. Between them tracks are followed by patch
 // alignment, which costs a third. One instance, one thread.
 //
-//   DetectionPolicy policy(false);
+//   DetectionPolicy policy;
 //   if (policy.due(observed)) detect();
 //   policy.pass(detected, observed_after);
 #pragma once
@@ -13,11 +13,8 @@ namespace fbvins {
 
 class DetectionPolicy {
  public:
-  /// `every`: in all images, for tracks that are not followed by alignment.
-  explicit DetectionPolicy(bool every) : every_(every) {}
-
   /// `observed`: tracks that alignment has found in this image.
-  bool due(int observed) const { return every_ || since_ >= kMostBetween || observed < kShareObserved * observed_then_; }
+  bool due(int observed) const { return since_ >= kMostBetween || observed < kShareObserved * observed_then_; }
   /// To be called after each image: whether keypoints were detected in it, and the tracks observed in it at the end.
   void pass(bool detected, int observed) {
     since_ = detected ? 0 : since_ + 1;
@@ -30,7 +27,6 @@ class DetectionPolicy {
   static constexpr int kMostBetween = 3;
   static constexpr double kShareObserved = 0.8;
 
-  bool every_;
   int since_ = 0;
   double observed_then_ = 0;
 };

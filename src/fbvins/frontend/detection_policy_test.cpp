@@ -18,33 +18,28 @@ int detecting_of(DetectionPolicy& policy, int images, int observed) {
 }
 
 TEST(DetectionPolicy, OneImageInFourWhileNothingIsLost) {
-  DetectionPolicy policy(false);
+  DetectionPolicy policy;
   policy.pass(true, 100);
   EXPECT_EQ(detecting_of(policy, 40, 100), 10);
 }
 
 TEST(DetectionPolicy, AtOnceWhenTracksAreLost) {
-  DetectionPolicy policy(false);
+  DetectionPolicy policy;
   policy.pass(true, 100);
   EXPECT_FALSE(policy.due(81));
   EXPECT_TRUE(policy.due(79));
 }
 
 TEST(DetectionPolicy, EveryImageWhileAllIsDarkAndTheFirstAfterIt) {
-  DetectionPolicy policy(false);
+  DetectionPolicy policy;
   policy.pass(true, 100);
   EXPECT_EQ(detecting_of(policy, 20, 0), 20);
 }
 
 TEST(DetectionPolicy, AdaptsToALastingDropInTracks) {
-  DetectionPolicy policy(false);
+  DetectionPolicy policy;
   policy.pass(true, 100);
   EXPECT_LT(detecting_of(policy, 40, 30), 15);
-}
-
-TEST(DetectionPolicy, AllWhereTracksCannotBeFollowed) {
-  DetectionPolicy policy(true);
-  EXPECT_EQ(detecting_of(policy, 10, 100), 10);
 }
 
 }  // namespace detection_policy_test

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "fbvins/frontend/frontend_options.hpp"
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace either_camera_test {

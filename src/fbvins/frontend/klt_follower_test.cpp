@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/features/shi_tomasi.hpp"
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace klt_follower_test {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "fbvins/features/noise_texture.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace klt_frontend_test {

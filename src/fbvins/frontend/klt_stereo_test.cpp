@@ -5,8 +5,8 @@
 
 #include <numbers>
 
-#include "fbvins/frontend/test_wall.hpp"
 #include "fbvins/geometry/so3.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace klt_stereo_test {

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The depth of the observed tracks: by the depth image where the rig has such a sensor, or by the right image, by aligning the
-// patch along the epipolar line; where patches are not followed, first by descriptor. Buffers are reused; one instance, one
-// thread.
+// patch along the epipolar line. Buffers are reused; one instance, one thread.
 //
 //   OrbDepth depth(rig, options);
-//   if (depth.wants_features()) stats.boost_ms += describer.describe(right_view, depth.right_features(), depth.right_mask());
 //   depth.match(tracks, images, stats);
 #pragma once
 
@@ -13,23 +11,16 @@
 #include "fbvins/frontend/frame_images.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
 #include "fbvins/frontend/orb_options.hpp"
-#include "fbvins/frontend/orb_stereo.hpp"
 #include "fbvins/frontend/orb_track.hpp"
+#include "fbvins/frontend/rectified_pair.hpp"
 #include "fbvins/frontend/typical_depth.hpp"
 
 namespace fbvins {
 
 class OrbDepth {
  public:
-  /// `sigma_px`: standard deviation of an observation in the right image.
-  OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px);
+  OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options);
 
-  /// Whether match() uses descriptors, of a right image.
-  bool wants_features() const { return by_descriptors_; }
-  /// If so, to be filled before match().
-  OrbFeatures& right_features() { return right_features_; }
-  /// What the right image hides; null: nothing.
-  const Mask* right_mask() const { return right_camera_.mask().get(); }
   /// Between the images that are matched next.
   void place(const Pose<C1, C0>& T_C1C0);
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
@@ -41,15 +32,11 @@ class OrbDepth {
  private:
   static bool take_measured(OrbTrack& track, const FrameImages& images);
   bool match(OrbTrack& track, const OrbPatches& patches, const FrameImages& images);
-  std::optional<Vec2> find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images);
 
   Camera right_camera_;
-  bool subpixel_, fill_in_, by_descriptors_;
   double sigma_px_;
-  OrbFeatures right_features_;
-  OrbStereoMatcher by_descriptor_;
+  RectifiedPair rectified_;
   KltStereoMatcher by_alignment_;
-  PatchRefiner refiner_;
   TypicalDepth typical_;
   std::vector<double> inverse_depths_;
 };

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/frontend/orb_starter.hpp"
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_depth_test {
@@ -27,8 +27,7 @@ struct Scene {
     images.take(frame, stats);
     describer.describe(frame.left->view(), view);
     OrbStarter(wall.camera, 40, 14).start(tracks, view, images.left(), stats);
-    OrbDepth depth(wall.rig(), options, 0.6);
-    describer.describe(frame.right->view(), depth.right_features());
+    OrbDepth depth(wall.rig(), options);
     depth.match(tracks, images, stats);
     return depth;
   }
@@ -45,14 +44,6 @@ TEST(OrbDepth, IsThatOfTheWall) {
     EXPECT_NEAR((track.px - track.right->pixel).x(), kDisparity_px, 0.5);
     EXPECT_NEAR(*track.inverse_depth, 1 / TestWall::kDepth_m, 0.03);
   }
-}
-
-TEST(OrbDepth, AlignmentFindsMoreThanDescriptorsAlone) {
-  Scene with, without;
-  (void)with.match({});
-  (void)without.match({.fill_in = false});
-  EXPECT_GT(without.stats.stereo, 5);
-  EXPECT_GT(with.stats.stereo, without.stats.stereo);
 }
 
 TEST(OrbDepth, NothingIsFoundNearerThanLookedFor) {

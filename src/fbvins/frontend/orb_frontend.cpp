@@ -12,8 +12,6 @@ namespace {
 /// Bounds of the gap without images after which tracks end. It is as long as tracks are remembered (memory_s), and no longer
 /// than the predictor's IMU readings span.
 constexpr double kShortestGap_s = 0.3, kLongestGap_s = 1.4;
-/// Standard deviation of a position that is not refined: descriptors alone are good to a pixel.
-constexpr double kSigmaUnrefined_px = 1.5;
 
 int count_observed(const OrbTracks& tracks) {
   return static_cast<int>(std::count_if(tracks.begin(), tracks.end(), [](const OrbTrack& t) { return t.observed; }));
@@ -26,7 +24,6 @@ OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features
 OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::shared_ptr<DescriptorStage> stage)
     : options_(options),
       most_(options.max_features),
-      sigma_px_(options.subpixel ? options.sigma_px : kSigmaUnrefined_px),
       camera_(rig.left),
       T_C1C0_(rig.T_C1C0()),
       images_(rig, kOrbAlignmentLevels),
@@ -34,12 +31,11 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       describer_(extraction(options), std::move(stage)),
       tracks_(options.max_features + kMostUnobserved),
       matcher_(options.search_px),
-      locator_(rig.left, {.subpixel = options.subpixel, .fill_in = options.fill_in, .follows = options.follows_patches()}),
+      locator_(rig.left),
       recogniser_(rig.left, options.recognition, extraction(options).levels),
       outliers_(rig.left, baseline_for_depths_m(rig), options.epipolar_px),
       starter_(rig.left, options.max_features, options.min_distance_px),
-      depth_(rig, options, sigma_px_),
-      detection_(!options.follows_patches()) {}
+      depth_(rig, options) {}
 
 TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& prior) {
   TrackedFrame out;
@@ -81,12 +77,10 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
   if (out.has_right) {
-    if (!images_.has_depth_image() && depth_.wants_features())
-      stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features(), depth_.right_mask());
     depth_.place(predictor_.at_exposures(T_C1C0_, images_.t(), images_.t_right()));
     depth_.match(tracks_, images_, stats);
   }
-  out.features = features_of(tracks_, camera_, sigma_px_);
+  out.features = features_of(tracks_, camera_, options_.sigma_px);
   stats.stereo_ms = timer.lap_ms();
   images_.advance();
   ++view_.index;

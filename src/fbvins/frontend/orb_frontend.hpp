@@ -54,8 +54,7 @@ class OrbFrontend final : public LeadingFrontend {
   bool resume(const HandedTrack& handed, const Pyramid& image);
 
   OrbFrontendOptions options_;
-  int most_;         ///< features
-  double sigma_px_;  // of an observation
+  int most_;  ///< features
   Camera camera_;
   Pose<C1, C0> T_C1C0_;
   FrameImages images_;

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "fbvins/core/options.hpp"
-#include "fbvins/frontend/passed_wall.hpp"
+#include "tests/support/passed_wall.hpp"
 
 namespace fbvins {
 namespace orb_frontend_test {
@@ -69,15 +69,6 @@ TEST(OrbFrontend, FollowsAWallThroughWideLensesAndSeesItsDepth) {
   }
 }
 
-TEST(OrbFrontend, WithoutSubpixelRefinementErrorsAreLarger) {
-  OrbFrontendOptions options = small_options();
-  options.subpixel = false;
-  options.fill_in = false;
-  const double without = median_error_px(run(packets(), options));
-  EXPECT_GT(without, 0.2);
-  EXPECT_LT(without, 1.5);
-}
-
 TEST(OrbFrontend, StereoGivesTheWallsDepth) {
   const auto frames = run(packets());
   int stereo = 0, all = 0;
@@ -102,19 +93,14 @@ TEST(OrbFrontend, ObservationsAreConsistent) {
   }
 }
 
-TEST(OrbFrontend, DetectsInOneImageInFourOrAllOfThem) {
-  for (const bool all : {false, true}) {
-    OrbFrontendOptions options = small_options();
-    options.examine_all = all;
-    const auto frames = run(packets(), options);
-    int matched = 0;
-    for (std::size_t k = 1; k < frames.size(); ++k) matched += frames[k].stats.matches.found > 0;
-    const int after_first = static_cast<int>(frames.size()) - 1;
-    if (all) EXPECT_EQ(matched, after_first);
-    else EXPECT_LE(matched, after_first / 2);
-    EXPECT_GT(frames.back().features.size(), 25u);
-    EXPECT_LT(median_error_px(frames), 0.12);
-  }
+TEST(OrbFrontend, DetectsInOneImageInFour) {
+  const auto frames = run(packets());
+  int matched = 0;
+  for (std::size_t k = 1; k < frames.size(); ++k) matched += frames[k].stats.matches.found > 0;
+  EXPECT_GT(matched, 0);
+  EXPECT_LE(matched, (static_cast<int>(frames.size()) - 1) / 2);
+  EXPECT_GT(frames.back().features.size(), 25u);
+  EXPECT_LT(median_error_px(frames), 0.12);
 }
 
 TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
@@ -177,21 +163,17 @@ TEST(OrbFrontend, HasNoFeatureInTheMask) {
   hide(right, MaskCircle{250, 120, 40});
   rig.left.set_mask(std::make_shared<const Mask>(left));
   rig.right.set_mask(std::make_shared<const Mask>(right));
-  for (const bool examine_all : {false, true}) {
-    OrbFrontendOptions options = small_options();
-    options.examine_all = examine_all;
-    int in_right = 0;
-    for (const TrackedFrame& frame : run(packets(), options, rig)) {
-      EXPECT_GT(frame.features.size(), 40u);
-      for (const TrackedFeature& feature : frame.features) {
-        EXPECT_FALSE(rig.left.hidden(feature.left->pixel, kPatchBorder_px));
-        if (!feature.right) continue;
-        EXPECT_FALSE(rig.right.hidden(feature.right->pixel, kPatchBorder_px));
-        ++in_right;
-      }
+  int in_right = 0;
+  for (const TrackedFrame& frame : run(packets(), small_options(), rig)) {
+    EXPECT_GT(frame.features.size(), 40u);
+    for (const TrackedFeature& feature : frame.features) {
+      EXPECT_FALSE(rig.left.hidden(feature.left->pixel, kPatchBorder_px));
+      if (!feature.right) continue;
+      EXPECT_FALSE(rig.right.hidden(feature.right->pixel, kPatchBorder_px));
+      ++in_right;
     }
-    EXPECT_GT(in_right, 150);
   }
+  EXPECT_GT(in_right, 150);
 }
 
 }  // namespace orb_frontend_test

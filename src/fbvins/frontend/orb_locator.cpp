@@ -6,18 +6,12 @@
 namespace fbvins {
 namespace {
 
-/// Fewest tracks from which the common error of the prediction is estimated.
-constexpr std::size_t kFewestForCommonMiss = 8;
 /// Smallest correlation for a track that is followed by alignment alone.
-constexpr double kFillInCorrelation = 0.85;
+constexpr double kFollowedCorrelation = 0.85;
 /// Farther than this from the prediction, alignment has found something else.
-constexpr double kFarthestFillIn_px = 50;
+constexpr double kFarthestFollowed_px = 50;
 /// A keypoint this near, times its scale, is the track's.
 constexpr double kSameFeature_px = 2;
-
-const Keypoint* keypoint_of(const OrbView& view, int found) {
-  return found < 0 ? nullptr : &view.features.keypoints[static_cast<std::size_t>(found)];
-}
 
 void take_over(OrbTrack& track, OrbView& view, std::size_t keypoint) {
   track.descriptor = view.descriptor(keypoint);
@@ -28,20 +22,6 @@ void take_over(OrbTrack& track, OrbView& view, std::size_t keypoint) {
 
 }  // namespace
 
-/// Median error of the prediction (gyro bias, unknown translation), by which tracks without a keypoint are corrected.
-Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const std::vector<int>& found) {
-  miss_x_px_.clear();
-  miss_y_px_.clear();
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (found[i] < 0 || !tracks[i].was_observed || tracks[i].observed) continue;
-    const Vec2 miss = keypoint_of(view, found[i])->pixel - tracks[i].px;
-    miss_x_px_.push_back(miss.x());
-    miss_y_px_.push_back(miss.y());
-  }
-  if (miss_x_px_.size() < kFewestForCommonMiss) return Vec2::Zero();
-  return {median(miss_x_px_), median(miss_y_px_)};
-}
-
 bool OrbLocator::set_observed_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view) {
   const Vec2 before = track.px;
   if (!px || !set_observed(track, *px, camera_, view)) return false;
@@ -51,11 +31,10 @@ bool OrbLocator::set_observed_at(const std::optional<Vec2>& px, OrbTrack& track,
 
 void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats) {
   motion_px_.clear();
-  if (!choices_.follows) return;
   for (OrbTrack& track : tracks) {
     if (!track.was_observed) continue;
     const OrbPatches& patches = tracks.patches(track);
-    std::optional<Vec2> px = follow_by_alignment(track, patches, track.px, images.left());
+    std::optional<Vec2> px = follow_by_alignment(track, patches, images.left());
     if (px && !returns(track, *px, images)) px.reset();
     if (!set_observed_at(px, track, view)) ++stats.lost_flow;
   }
@@ -64,36 +43,26 @@ void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImage
 
 void OrbLocator::locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found,
                         FrontendStats& stats) {
-  const Vec2 missed = common_miss(tracks, view, found);
   for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (found[i] < 0) continue;
     OrbTrack& track = tracks[i];
-    const Keypoint* keypoint = keypoint_of(view, found[i]);
+    const auto k = static_cast<std::size_t>(found[i]);
+    const Keypoint& keypoint = view.features.keypoints[k];
     if (track.observed) {
-      if (keypoint != nullptr && (keypoint->pixel - track.px).norm() < kSameFeature_px * keypoint->scale)
-        take_over(track, view, static_cast<std::size_t>(found[i]));
+      if ((keypoint.pixel - track.px).norm() < kSameFeature_px * keypoint.scale) take_over(track, view, k);
       continue;
     }
-    const auto px = place(track, tracks.patches(track), keypoint, track.px + missed, images, stats);
-    if (set_observed_at(px, track, view) && keypoint != nullptr) take_over(track, view, static_cast<std::size_t>(found[i]));
+    const auto px = place(track, tracks.patches(track), keypoint, images);
+    if (!px) ++stats.lost_check;
+    if (set_observed_at(px, track, view)) take_over(track, view, k);
   }
   stats.median_motion_px = median(motion_px_);
 }
 
-std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches, const Keypoint* keypoint,
-                                      const Vec2& expected_px, const FrameImages& images, FrontendStats& stats) {
-  std::optional<Vec2> px;
-  if (keypoint != nullptr) {
-    px = choices_.subpixel ? refine_match(track, patches, *keypoint, images.left()) : std::optional<Vec2>(keypoint->pixel);
-    if (!px) ++stats.lost_check;
-  } else if (track.was_observed && choices_.fill_in && !choices_.follows) {
-    px = follow_by_alignment(track, patches, expected_px, images.left());
-    if (!px) ++stats.lost_flow;
-  }
-  if (px && track.was_observed && choices_.subpixel && !returns(track, *px, images)) {
-    px.reset();
-    ++stats.lost_check;
-  }
-  return px;
+std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches, const Keypoint& keypoint,
+                                      const FrameImages& images) {
+  const std::optional<Vec2> px = refine_match(track, patches, keypoint, images.left());
+  return px && track.was_observed && !returns(track, *px, images) ? std::nullopt : px;
 }
 
 /// From a keypoint to the position at which the image matches the track's patches.
@@ -108,11 +77,10 @@ std::optional<Vec2> OrbLocator::refine_match(OrbTrack& track, const OrbPatches& 
   return hold_to_reference(track, patches, newest.px, left);
 }
 
-std::optional<Vec2> OrbLocator::follow_by_alignment(OrbTrack& track, const OrbPatches& patches, const Vec2& expected_px,
-                                                    const Pyramid& left) {
-  const KltResult newest = klt_align(patches.newest, left, expected_px, kOrbAlignmentLevels - 1, 0);
-  if (!newest.ok() || newest.correlation < kFillInCorrelation) return std::nullopt;
-  if ((newest.px - expected_px).norm() > kFarthestFillIn_px) return std::nullopt;
+std::optional<Vec2> OrbLocator::follow_by_alignment(OrbTrack& track, const OrbPatches& patches, const Pyramid& left) {
+  const KltResult newest = klt_align(patches.newest, left, track.px, kOrbAlignmentLevels - 1, 0);
+  if (!newest.ok() || newest.correlation < kFollowedCorrelation) return std::nullopt;
+  if ((newest.px - track.px).norm() > kFarthestFollowed_px) return std::nullopt;
   return hold_to_reference(track, patches, newest.px, left);
 }
 

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/frontend/orb_starter.hpp"
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_locator_test {
@@ -50,17 +50,16 @@ struct Scene {
 TEST(OrbLocator, FollowsTracksWithoutAKeypointByAlignment) {
   Scene scene;
   const std::size_t all = scene.tracks.size();
-  OrbLocator(scene.wall.camera, {.follows = true}).follow(scene.tracks, scene.view, scene.images, scene.stats);
+  OrbLocator(scene.wall.camera).follow(scene.tracks, scene.view, scene.images, scene.stats);
   const std::vector<double> errors = scene.errors_px();
   EXPECT_GT(errors.size(), all * 3 / 4);
   for (const double error : errors) EXPECT_LT(error, 0.3);
   EXPECT_EQ(scene.stats.lost_flow, static_cast<int>(all - errors.size()));
 }
 
-TEST(OrbLocator, WithoutFillInOnlyKeypointsCount) {
+TEST(OrbLocator, LocatesByKeypointsOnly) {
   Scene scene;
-  OrbLocator(scene.wall.camera, {.fill_in = false})
-      .locate(scene.tracks, scene.view, scene.images, scene.no_keypoints(), scene.stats);
+  OrbLocator(scene.wall.camera).locate(scene.tracks, scene.view, scene.images, scene.no_keypoints(), scene.stats);
   EXPECT_TRUE(scene.errors_px().empty());
 }
 
@@ -73,7 +72,7 @@ TEST(OrbLocator, RefinesAKeypointAndTakesItsDescriptor) {
       if ((scene.view.features.keypoints[k].pixel - scene.tracks[i].px).norm() < 1.5 && found[i] < 0)
         found[i] = static_cast<int>(k), ++near;
   ASSERT_GT(near, 10);
-  OrbLocator(scene.wall.camera, {}).locate(scene.tracks, scene.view, scene.images, found, scene.stats);
+  OrbLocator(scene.wall.camera).locate(scene.tracks, scene.view, scene.images, found, scene.stats);
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i] < 0 || !scene.tracks[i].observed) continue;
     EXPECT_EQ(scene.tracks[i].descriptor, scene.view.descriptor(static_cast<std::size_t>(found[i])));
@@ -88,7 +87,7 @@ TEST(OrbLocator, AKeypointOfSomethingElseIsNotTaken) {
   for (std::size_t k = 0; k < scene.view.features.size() && found[0] < 0; ++k)
     if ((scene.view.features.keypoints[k].pixel - scene.tracks[0].px).norm() > 40) found[0] = static_cast<int>(k);
   ASSERT_GE(found[0], 0);
-  OrbLocator(scene.wall.camera, {.fill_in = false}).locate(scene.tracks, scene.view, scene.images, found, scene.stats);
+  OrbLocator(scene.wall.camera).locate(scene.tracks, scene.view, scene.images, found, scene.stats);
   EXPECT_FALSE(scene.tracks[0].observed);
   EXPECT_EQ(scene.stats.lost_check, 1);
 }

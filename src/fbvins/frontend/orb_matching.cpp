@@ -9,6 +9,25 @@ namespace {
 /// Larger than the distance of any two descriptors.
 constexpr int kFar = 257;
 
+/// The best candidate, if it passes the distance and ratio tests; the second best is one farther than kRival_px away. -1 if none.
+int pick_match(std::span<const std::int32_t> candidates, std::span<const std::uint16_t> distances,
+               std::span<const Keypoint> keypoints, int max_distance_bits, int* distance) {
+  int best = -1, first = kFar;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (distances[i] < first) first = distances[i], best = candidates[i];
+  if (best < 0 || first > max_distance_bits) return -1;
+  int second = kFar;
+  const Keypoint& winner = keypoints[static_cast<std::size_t>(best)];
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Keypoint& rival = keypoints[static_cast<std::size_t>(candidates[i])];
+    const double same = kRival_px * std::max(rival.scale, winner.scale);
+    if ((rival.pixel - winner.pixel).squaredNorm() > same * same) second = std::min<int>(second, distances[i]);
+  }
+  if (second < kFar && !(first < kMatchRatio * second)) return -1;
+  *distance = first;
+  return best;
+}
+
 }  // namespace
 
 void GuidedMatcher::match(std::span<const GuidedQuery> queries, const OrbFeatures& features, const KeypointGrid& grid,
@@ -29,24 +48,6 @@ void GuidedMatcher::match(std::span<const GuidedQuery> queries, const OrbFeature
   }
   for (std::size_t i = 0; i < queries.size(); ++i)
     if (found[i] >= 0 && owner_[static_cast<std::size_t>(found[i])] != static_cast<int>(i)) found[i] = -1;
-}
-
-int pick_match(std::span<const std::int32_t> candidates, std::span<const std::uint16_t> distances,
-               std::span<const Keypoint> keypoints, int max_distance_bits, int* distance) {
-  int best = -1, first = kFar;
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    if (distances[i] < first) first = distances[i], best = candidates[i];
-  if (best < 0 || first > max_distance_bits) return -1;
-  int second = kFar;
-  const Keypoint& winner = keypoints[static_cast<std::size_t>(best)];
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Keypoint& rival = keypoints[static_cast<std::size_t>(candidates[i])];
-    const double same = kRival_px * std::max(rival.scale, winner.scale);
-    if ((rival.pixel - winner.pixel).squaredNorm() > same * same) second = std::min<int>(second, distances[i]);
-  }
-  if (second < kFar && !(first < kMatchRatio * second)) return -1;
-  *distance = first;
-  return best;
 }
 
 }  // namespace fbvins

@@ -43,8 +43,4 @@ class GuidedMatcher {
   std::vector<int> owner_, owner_distance_;  // best query of each keypoint
 };
 
-/// The best candidate, if it passes the distance and ratio tests; the second best is one farther than kRival_px away. -1 if none.
-int pick_match(std::span<const std::int32_t> candidates, std::span<const std::uint16_t> distances,
-               std::span<const Keypoint> keypoints, int max_distance_bits, int* distance);
-
 }  // namespace fbvins

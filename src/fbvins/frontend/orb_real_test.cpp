@@ -30,7 +30,7 @@ struct Tally {
 };
 
 /// Without IMU, hence without prediction.
-Tally run(const std::filesystem::path& folder, int max_frames, bool subpixel) {
+Tally run(const std::filesystem::path& folder, int max_frames) {
   DatasetOptions dataset_options;
   dataset_options.max_frames = max_frames;
   dataset_options.require_imu = false;
@@ -44,8 +44,6 @@ Tally run(const std::filesystem::path& folder, int max_frames, bool subpixel) {
   const Pose<C1, C0> T_C1C0 = data.rig().T_C1C0();
   const Mat3 E = hat(T_C1C0.p) * T_C1C0.R();
   OrbFrontendOptions options;
-  options.subpixel = subpixel;
-  options.fill_in = subpixel;
   options.stereo_epipolar_px = 3.0;
   OrbFrontend frontend(data.rig(), options);
   while (auto event = data.next()) {
@@ -68,19 +66,18 @@ Tally run(const std::filesystem::path& folder, int max_frames, bool subpixel) {
 TEST(OrbFrontendOnRealImages, FollowsAndMatchesTheMachineHall) {
   const auto folder = data_folder() / "MH_01_easy_17s";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
-  Tally fine = run(folder, 40, true), coarse = run(folder, 40, false);
+  Tally fine = run(folder, 40);
   EXPECT_EQ(fine.frames, 40);
   EXPECT_GT(fine.features / fine.frames, 120);
   EXPECT_GT(fine.tracked / fine.frames, 100);
   EXPECT_GT(fine.stereo / fine.features, 0.6);
   EXPECT_LT(fine.median_epipolar_px(), 0.35);
-  EXPECT_GT(coarse.median_epipolar_px(), 1.3 * fine.median_epipolar_px());
 }
 
 TEST(OrbFrontendOnRealImages, StereoOnKeyframesFarApart) {
   const auto folder = data_folder() / "V1_01_easy_keyframes";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
-  Tally tally = run(folder, 30, true);
+  Tally tally = run(folder, 30);
   EXPECT_EQ(tally.frames, 30);
   EXPECT_GT(tally.stereo / tally.features, 0.5);
   EXPECT_LT(tally.median_epipolar_px(), 0.5);

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "fbvins/frontend/orb_starter.hpp"
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_recogniser_test {

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_starter_test {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/frontend/orb_starter.hpp"
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_track_matcher_test {

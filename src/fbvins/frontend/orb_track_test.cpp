@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/frontend/test_wall.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_track_test {

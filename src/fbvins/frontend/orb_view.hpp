@@ -42,12 +42,8 @@ class OrbDescriber {
   /// Fills all of the view that depends on the image alone, and on its camera's mask. Returns the CPU time that improving took,
   /// ms.
   double describe(const ImageView& image, OrbView& view, const Mask* mask = nullptr);
-  /// Only the features, of another image.
-  double describe(const ImageView& image, OrbFeatures& features, const Mask* mask = nullptr);
 
  private:
-  double improve(const ImageView& image, OrbFeatures& features);
-
   std::shared_ptr<DescriptorStage> stage_;
   OrbExtractor extractor_;
 };

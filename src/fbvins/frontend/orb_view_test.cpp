@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/features/noise_texture.hpp"
+#include "tests/support/noise_texture.hpp"
 
 namespace fbvins {
 namespace orb_view_test {

@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "fbvins/frontend/frontend_options.hpp"
-#include "fbvins/frontend/test_wall.hpp"
 #include "fbvins/geometry/so3.hpp"
+#include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace rig_frontend_test {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/geometry/jacobian_check.hpp"
-#include "fbvins/imu/integrated_test_motion.hpp"
+#include "tests/support/integrated_test_motion.hpp"
 
 namespace fbvins {
 namespace imu_residual_test {

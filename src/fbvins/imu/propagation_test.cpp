@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/imu/integrated_test_motion.hpp"
+#include "tests/support/integrated_test_motion.hpp"
 
 namespace fbvins {
 namespace propagation_test {

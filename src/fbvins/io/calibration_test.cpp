@@ -7,8 +7,8 @@
 
 #include <fstream>
 
-#include "fbvins/io/kalibr_test_files.hpp"
 #include "fbvins/io/yaml_reader.hpp"
+#include "tests/support/kalibr_test_files.hpp"
 
 namespace fbvins {
 namespace calibration_test {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/calibration.hpp"
 
 namespace fbvins {

@@ -12,8 +12,6 @@
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/foreign_files.hpp"
 #include "fbvins/io/imu_file.hpp"
-#include "fbvins/io/imu_state_file.hpp"
-#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/kitti_poses.hpp"
 #include "fbvins/io/trajectory.hpp"
 

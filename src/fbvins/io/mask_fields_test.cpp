@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/io/calibration.hpp"
-#include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
 #include "fbvins/io/rig_text.hpp"
 

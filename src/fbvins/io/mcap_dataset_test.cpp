@@ -10,7 +10,7 @@
 
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
-#include "fbvins/io/kalibr_test_files.hpp"
+#include "tests/support/kalibr_test_files.hpp"
 
 namespace fbvins {
 namespace mcap_dataset_test {

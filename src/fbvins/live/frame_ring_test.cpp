@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/live/socket_test_sender.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins {
 namespace frame_ring_test {

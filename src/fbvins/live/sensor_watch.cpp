@@ -29,7 +29,7 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
   else if (silent != 0) reason = HealthReason::one_camera;
   if (reason == HealthReason::none) return said;
   const auto worse = [&](HealthState state, HealthReason why, unsigned without = 0) {
-    return Health{state, why, static_cast<std::uint8_t>(without), said.covered_percent};
+    return Health{state, why, static_cast<std::uint8_t>(without)};
   };
   if (!said.has_pose()) return reason == HealthReason::one_camera ? said : worse(said.state, reason);
   if (blind_s > silent_s) {

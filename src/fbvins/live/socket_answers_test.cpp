@@ -6,7 +6,7 @@
 #include <limits>
 #include <thread>
 
-#include "fbvins/live/socket_source_fixture.hpp"
+#include "tests/support/socket_source_fixture.hpp"
 
 namespace fbvins {
 namespace socket_answers_test {

@@ -8,7 +8,7 @@
 
 #include <fstream>
 
-#include "fbvins/live/socket_test_sender.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins {
 namespace socket_file_test {

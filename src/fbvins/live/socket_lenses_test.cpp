@@ -10,7 +10,7 @@
 #include <variant>
 
 #include "fbvins/live/socket_message.hpp"
-#include "fbvins/live/socket_test_sender.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins {
 namespace socket_lenses_test {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "fbvins/live/socket_test_sender.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins {
 namespace socket_message_test {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/live/socket_source_fixture.hpp"
+#include "tests/support/socket_source_fixture.hpp"
 
 namespace fbvins {
 namespace socket_source_test {

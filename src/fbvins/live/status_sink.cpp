@@ -28,7 +28,6 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
   json["health"] = to_string(status.health.state);
   json["reason"] = to_string(status.health.reason);
   if (status.health.without_cameras != 0) json["without_cameras"] = cameras_in(status.health.without_cameras);
-  if (const auto covered = covered_percent_of(status.health); !covered.empty()) json["covered_percent"] = covered;
   json["reset_counter"] = status.reset_counter;
   if (newest.health.has_pose()) {
     const Vec3& p = newest.T_WB.p;

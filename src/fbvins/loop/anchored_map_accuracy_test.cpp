@@ -2,7 +2,7 @@
 // How well anchors put a map into the building's frame, over whole flights with and without outliers.
 #include <gtest/gtest.h>
 
-#include "fbvins/loop/anchored_flight.hpp"
+#include "tests/support/anchored_flight.hpp"
 
 namespace fbvins {
 namespace anchored_map_accuracy_test {

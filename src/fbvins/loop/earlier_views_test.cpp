@@ -6,9 +6,9 @@
 
 #include <limits>
 
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/loop/place_extractor.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/noise_texture.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace earlier_views_test {

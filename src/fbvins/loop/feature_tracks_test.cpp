@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace feature_tracks_test {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace flight_session_test {

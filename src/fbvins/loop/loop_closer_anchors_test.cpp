@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "fbvins/loop/anchored_flight.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "tests/support/anchored_flight.hpp"
 
 namespace fbvins {
 namespace loop_closer_anchors_test {

@@ -7,7 +7,7 @@
 #include "fbvins/core/angle.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_edges.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace loop_closer_level_test {

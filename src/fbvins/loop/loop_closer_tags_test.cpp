@@ -6,11 +6,11 @@
 #include <cmath>
 #include <set>
 
-#include "fbvins/loop/anchored_flight.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_merge.hpp"
 #include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/map_tags.hpp"
+#include "tests/support/anchored_flight.hpp"
 
 namespace fbvins {
 namespace loop_closer_tags_test {

@@ -9,9 +9,8 @@
 #include <cmath>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/loop/map_edges.hpp"
 #include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace loop_closer_test {

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <utility>
 
-#include "fbvins/features/noise_texture.hpp"
 #include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/test_room.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
+#include "tests/support/noise_texture.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace loop_map_test {

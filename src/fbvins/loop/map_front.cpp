@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "fbvins/loop/binary_file.hpp"
-#include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_records.hpp"
 #include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/map_writer.hpp"

@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/loop/anchored_flight.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/anchored_flight.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace map_journal_test {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace map_merge_test {

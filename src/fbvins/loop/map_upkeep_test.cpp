@@ -5,7 +5,7 @@
 
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace map_upkeep_test {

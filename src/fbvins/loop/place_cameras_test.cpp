@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/features/noise_texture.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/noise_texture.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace place_cameras_test {

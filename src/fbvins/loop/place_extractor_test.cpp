@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "fbvins/features/noise_texture.hpp"
-#include "fbvins/loop/test_room.hpp"
+#include "tests/support/noise_texture.hpp"
+#include "tests/support/test_room.hpp"
 
 namespace fbvins {
 namespace place_extractor_test {

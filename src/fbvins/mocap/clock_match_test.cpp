@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/mocap/hand_eye_scene.hpp"
+#include "tests/support/hand_eye_scene.hpp"
 
 namespace fbvins {
 namespace clock_match_test {

@@ -9,8 +9,8 @@
 
 #include "fbvins/core/angle.hpp"
 #include "fbvins/mocap/hand_eye.hpp"
-#include "fbvins/mocap/hand_eye_scene.hpp"
 #include "fbvins/mocap/marker_faults.hpp"
+#include "tests/support/hand_eye_scene.hpp"
 
 namespace fbvins {
 namespace hand_eye_statistics_test {

@@ -7,7 +7,7 @@
 
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/mocap/hand_eye_scene.hpp"
+#include "tests/support/hand_eye_scene.hpp"
 
 namespace fbvins {
 namespace hand_eye_test {

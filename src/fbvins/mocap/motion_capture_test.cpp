@@ -10,7 +10,7 @@
 #include "fbvins/io/cdr.hpp"
 #include "fbvins/io/mcap_writer.hpp"
 #include "fbvins/io/ros_messages.hpp"
-#include "fbvins/mocap/marker_test_files.hpp"
+#include "tests/support/marker_test_files.hpp"
 
 namespace fbvins {
 namespace motion_capture_test {

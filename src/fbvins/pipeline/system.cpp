@@ -12,7 +12,6 @@
 #include "fbvins/camera/lens_faces.hpp"
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/estimator/estimator.hpp"
-#include "fbvins/frontend/lens_watch.hpp"
 #include "fbvins/pipeline/feedback.hpp"
 #include "fbvins/pipeline/keyframe_anchors.hpp"
 #include "fbvins/pipeline/keyframe_readings.hpp"
@@ -61,7 +60,6 @@ struct System::Impl {
   RunMode mode;
   ExposureOffsets own_offsets;  ///< of the rig's cameras
   LensFaces lenses;             ///< makes of a wide lens the cameras that the frontend and the estimator are given
-  LensWatch lens_watch;
   PacketMaker packet_maker;
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
@@ -87,12 +85,10 @@ struct System::Impl {
   /// Deep enough for the keyframes of a second or two, while the mapper optimises its whole graph.
   Stage<MapTask, Impl> mapping{"the mapper", &Impl::map, BoundedQueue<MapTask>{12}};
 
-  Impl(const SystemOptions& options, const StereoRig& rig, LensFaces lenses_of_rig, LensWatch watch, RunMode mode_wanted,
-       SystemParts parts)
+  Impl(const SystemOptions& options, const StereoRig& rig, LensFaces lenses_of_rig, RunMode mode_wanted, SystemParts parts)
       : mode(mode_wanted),
         own_offsets(fbvins::own_offsets(rig)),
         lenses(std::move(lenses_of_rig)),
-        lens_watch(std::move(watch)),
         packet_maker(options.input, lenses.rig().imu_noise, Duration::from_seconds(lenses.rig().time_offset_s)),
         frontend(std::move(parts.frontend)),
         estimator(lenses.rig(), options.estimator, parts.imu_state),
@@ -113,8 +109,6 @@ struct System::Impl {
     StereoFrame images = packet.frame;
     packet.frame = lenses.spread(std::move(packet.frame));
     TrackedFrame frame = frontend->process(packet, told.prior);
-    lens_watch.add(packet, told.prior, frame);
-    frame.covered_percent = lenses.covered_percent([this](int camera) { return lens_watch.covered_px(camera); });
     frame.id = packet.id;
     frame.t = packet.frame.t;
     frame.imu = std::move(packet.imu);
@@ -132,7 +126,6 @@ struct System::Impl {
     Estimate estimate = estimator.process(frame);
     std::uint8_t& without_cameras = estimate.odometry.health.without_cameras;
     without_cameras = lenses.lenses_of(without_cameras);
-    estimate.odometry.health.covered_percent = frame.covered_percent;
     frame.imu.noise = estimate.imu_noise;
     if (keyframes_wanted()) complete(estimate, frame);
     if (on_window && (!window_wanted || window_wanted())) on_window(estimator.snapshot());
@@ -246,13 +239,12 @@ Result<System> System::create(const SystemOptions& options, const StereoRig& rig
   if (Result<void> good = check_rig(rig, "the rig"); !good) return good.error();
   LensFaces lenses(rig);
   if (Result<void> good = check_estimator(options.estimator, lenses); !good) return good.error();
-  LensWatch watch(lenses.rig());
   if (!parts.frontend) {
-    Result<std::unique_ptr<Frontend>> frontend = make_frontend(watch.rig(), options.frontend);
+    Result<std::unique_ptr<Frontend>> frontend = make_frontend(lenses.rig(), options.frontend);
     if (!frontend) return frontend.error();
     parts.frontend = std::move(*frontend);
   }
-  return System(std::make_unique<Impl>(options, rig, std::move(lenses), std::move(watch), mode, std::move(parts)));
+  return System(std::make_unique<Impl>(options, rig, std::move(lenses), mode, std::move(parts)));
 }
 
 System::System(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "fbvins/pipeline/sway_recording.hpp"
+#include "tests/support/sway_recording.hpp"
 
 namespace fbvins {
 namespace system_failure_test {

@@ -13,7 +13,7 @@
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
-#include "fbvins/pipeline/sway_recording.hpp"
+#include "tests/support/sway_recording.hpp"
 
 namespace fbvins {
 namespace system_map_test {

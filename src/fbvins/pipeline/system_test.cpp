@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "fbvins/pipeline/sway_recording.hpp"
+#include "tests/support/sway_recording.hpp"
 
 namespace fbvins {
 namespace system_test {

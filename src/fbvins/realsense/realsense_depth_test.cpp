@@ -5,9 +5,9 @@
 #include <chrono>
 #include <thread>
 
-#include "fbvins/live/collected_input.hpp"
 #include "fbvins/realsense/realsense_camera.hpp"
-#include "fbvins/realsense/realsense_test_device.hpp"
+#include "tests/support/collected_input.hpp"
+#include "tests/support/realsense_test_device.hpp"
 
 namespace fbvins {
 namespace realsense_depth_test {

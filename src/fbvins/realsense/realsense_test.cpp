@@ -12,11 +12,11 @@
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/dataset.hpp"
-#include "fbvins/io/kalibr_test_files.hpp"
-#include "fbvins/live/collected_input.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/realsense/realsense_source.hpp"
-#include "fbvins/realsense/realsense_test_device.hpp"
+#include "tests/support/collected_input.hpp"
+#include "tests/support/kalibr_test_files.hpp"
+#include "tests/support/realsense_test_device.hpp"
 
 namespace fbvins {
 namespace realsense_test {

@@ -25,10 +25,8 @@ struct DeleteQos {
 };
 using Qos = std::unique_ptr<dds_qos_t, DeleteQos>;
 
-/// With the hash of the type, where it is one that we publish. `more`: further data for the user data, "KEY=VALUE;".
-Qos make_qos(const Ros2Quality& quality, const std::string& type, const std::string& more = {});
-/// What an endpoint says of itself under a key in its user data; empty: nothing.
-std::string said_under(const dds_qos_t* qos, std::string_view key);
+/// With the hash of the type, where it is one that we publish.
+Qos make_qos(const Ros2Quality& quality, const std::string& type);
 
 struct TopicOfBytes {
   DdsEntity entity;

@@ -7,9 +7,9 @@
 #include <ctime>
 
 #include "fbvins/io/ros_messages.hpp"
-#include "fbvins/live/socket_test_sender.hpp"
 #include "fbvins/live/view_landmarks.hpp"
-#include "fbvins/ros2/ros2_test_graph.hpp"
+#include "tests/support/ros2_test_graph.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins {
 namespace ros2_image_sink_test {

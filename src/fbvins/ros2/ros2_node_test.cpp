@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "fbvins/ros2/ros2_test_graph.hpp"
+#include "tests/support/ros2_test_graph.hpp"
 
 namespace fbvins {
 namespace ros2_node_test {

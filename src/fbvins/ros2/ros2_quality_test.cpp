@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/ros2/dds_wire.hpp"
-#include "fbvins/ros2/ros2_test_graph.hpp"
+#include "tests/support/ros2_test_graph.hpp"
 
 namespace fbvins {
 namespace ros2_quality_test {

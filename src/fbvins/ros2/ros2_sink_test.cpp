@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "fbvins/io/ros_messages.hpp"
-#include "fbvins/live/socket_test_sender.hpp"
-#include "fbvins/ros2/ros2_test_graph.hpp"
+#include "tests/support/ros2_test_graph.hpp"
+#include "tests/support/socket_test_sender.hpp"
 
 namespace fbvins {
 namespace ros2_sink_test {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "fbvins/io/ros_messages.hpp"
-#include "fbvins/ros2/ros2_test_graph.hpp"
+#include "tests/support/ros2_test_graph.hpp"
 
 namespace fbvins {
 namespace ros2_source_test {

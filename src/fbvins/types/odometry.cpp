@@ -43,10 +43,6 @@ std::string to_sentence(const Health& health) {
   const std::vector<int> without = cameras_in(health.without_cameras);
   if (!without.empty()) out += without.size() == 1 ? ", without camera" : ", without cameras";
   for (const int camera : without) out.append(" ").append(std::to_string(camera));
-  const std::vector<int> covered = covered_percent_of(health);
-  for (std::size_t c = 0; c < covered.size(); ++c)
-    if (covered[c] > 0)
-      out.append(", camera ").append(std::to_string(c)).append(" covered by ").append(std::to_string(covered[c])).append(" %");
   return out;
 }
 
@@ -54,12 +50,6 @@ std::vector<int> cameras_in(std::uint8_t bits) {
   std::vector<int> out;
   for (int c = 0; c < 8; ++c)
     if ((bits >> c & 1) != 0) out.push_back(c);
-  return out;
-}
-
-std::vector<int> covered_percent_of(const Health& health) {
-  std::vector<int> out(health.covered_percent.begin(), health.covered_percent.end());
-  while (!out.empty() && out.back() == 0) out.pop_back();
   return out;
 }
 

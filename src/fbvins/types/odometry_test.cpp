@@ -12,10 +12,6 @@ TEST(Health, IsASentenceThatNamesTheCameras) {
   EXPECT_EQ(to_sentence({HealthState::degraded, HealthReason::one_camera, 0b10}), "degraded: one_camera, without camera 1");
   EXPECT_EQ(to_sentence({HealthState::degraded, HealthReason::one_camera, 0b10000101}),
             "degraded: one_camera, without cameras 0 2 7");
-  EXPECT_EQ(to_sentence({HealthState::good, HealthReason::none, 0, {0, 4, 0, 12}}),
-            "good, camera 1 covered by 4 %, camera 3 covered by 12 %");
-  EXPECT_EQ(covered_percent_of({HealthState::good, HealthReason::none, 0, {0, 4, 0, 12}}), (std::vector<int>{0, 4, 0, 12}));
-  EXPECT_EQ(covered_percent_of({}), std::vector<int>{});
   EXPECT_EQ(cameras_in(0), std::vector<int>{});
 }
 

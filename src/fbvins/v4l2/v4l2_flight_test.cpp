@@ -13,8 +13,8 @@
 
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/live/live_system.hpp"
-#include "fbvins/v4l2/fake_flight_controller.hpp"
-#include "fbvins/v4l2/running_source.hpp"
+#include "tests/support/fake_flight_controller.hpp"
+#include "tests/support/running_source.hpp"
 
 namespace fbvins {
 namespace v4l2_flight_test {

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "fbvins/live/collected_input.hpp"
-#include "fbvins/v4l2/running_source.hpp"
+#include "tests/support/collected_input.hpp"
+#include "tests/support/running_source.hpp"
 
 namespace fbvins {
 namespace v4l2_source_test {

@@ -11,7 +11,7 @@
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/live/record_sink.hpp"
 #include "fbvins/web/flight_player.hpp"
-#include "fbvins/web/web_test_client.hpp"
+#include "tests/support/web_test_client.hpp"
 
 namespace fbvins {
 namespace finished_flight_test {

@@ -9,7 +9,6 @@
 #include <map>
 
 #include "fbvins/io/flight_record.hpp"
-#include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 #include "fbvins/web/record_messages.hpp"
 

@@ -88,7 +88,6 @@ SharedMessage state_message(double t_s, const Odometry& o, const LiveView* view,
   Json json{{"type", "state"}, {"t_s", rounded(t_s)}, {"image", o.id.value}, {"health", to_string(o.health.state)}};
   json["reason"] = to_string(o.health.reason);
   if (o.health.without_cameras != 0) json["without_cameras"] = cameras_in(o.health.without_cameras);
-  if (const auto covered = covered_percent_of(o.health); !covered.empty()) json["covered_percent"] = covered;
   json["reset_counter"] = o.reset_counter;
   if (o.health.has_pose()) {
     const Mat6& C = o.pose_covariance;

@@ -8,7 +8,7 @@
 #include <random>
 #include <thread>
 
-#include "fbvins/web/web_test_client.hpp"
+#include "tests/support/web_test_client.hpp"
 
 namespace fbvins {
 namespace web_server_test {

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "fbvins/web/web_test_client.hpp"
+#include "tests/support/web_test_client.hpp"
 
 namespace fbvins {
 namespace web_sink_test {
