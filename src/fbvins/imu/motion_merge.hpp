@@ -5,6 +5,7 @@
 //   while (auto sample = merge.next()) input.push(*sample);
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <optional>
 
@@ -23,14 +24,17 @@ class MotionMerge {
   void add_gyro(Time t, const Vec3& gyro_radps);
   void add_accel(Time t, const Vec3& accel_mps2);
   std::optional<ImuSample> next();
+  /// Readings that were dropped: their stamps do not ascend, or the other sensor was silent for too long.
+  std::int64_t left_out() const { return left_out_; }
 
  private:
   struct Reading {
     Time t;
     Vec3 value;
   };
-  static void add(std::deque<Reading>& readings, Time t, const Vec3& value);
+  void add(std::deque<Reading>& readings, Time t, const Vec3& value);
   std::deque<Reading> gyro_, accel_;
+  std::int64_t left_out_ = 0;
 };
 
 }  // namespace fbvins

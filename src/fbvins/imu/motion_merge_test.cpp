@@ -46,6 +46,7 @@ TEST(MotionMerge, MakesNothingUpWhereTheAccelerometerIsSilent) {
   std::vector<std::int64_t> left_ms;
   for (const ImuSample& sample : all(merge)) left_ms.push_back(sample.t.ns / 1'000'000);
   EXPECT_EQ(left_ms, (std::vector<std::int64_t>{0, 5, 10, 15, 20, 200, 205, 210}));
+  EXPECT_EQ(merge.left_out(), 35) << "from 25 to 195 ms";
 }
 
 TEST(MotionMerge, DropsReadingsThatGoBackAndKeepsABoundedNumber) {
@@ -58,6 +59,7 @@ TEST(MotionMerge, DropsReadingsThatGoBackAndKeepsABoundedNumber) {
   const auto samples = all(merge);
   ASSERT_EQ(samples.size(), 1u);
   EXPECT_EQ(samples[0].accel_mps2, Vec3(Vec3::UnitX()));
+  EXPECT_EQ(merge.left_out(), 2);
   for (int i = 0; i < 100000; ++i) merge.add_gyro(at(1 + i * 0.005), Vec3::Zero());
   merge.add_accel(at(600), Vec3::Zero());
   merge.add_accel(at(600.01), Vec3::Zero());

@@ -272,6 +272,8 @@ void RealsenseCamera::take_motion(const rs2::motion_frame& frame, Time t, Sensor
   if (frame.get_profile().stream_type() == RS2_STREAM_GYRO) motion_.add_gyro(t, value);
   else motion_.add_accel(t, value);
   while (auto sample = motion_.next()) input.push(*sample);
+  if (motion_.left_out() > 0)
+    say_once("readings whose stamps do not ascend, or of one sensor while the other was silent, are left out");
 }
 
 void RealsenseCamera::say_once(const std::string& sentence) {

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <atomic>
+#include <utility>
 
 #include "fbvins/live/byte_link.hpp"
 #include "fbvins/live/host_clock.hpp"
@@ -58,6 +59,8 @@ class MavlinkFeed final : public ImuFeed {
                                                : "the flight controller's IMU";
     if (state != told_) say_(fmt::format("{}: {}", where_, state));
     told_ = state;
+    if (imu_.refused() > 0 && !std::exchange(told_refused_, true))
+      say_(fmt::format("{}: readings with stamps that cannot be right, or numbers that are not finite, are left out", where_));
     if (link_.newest_stranger() == told_stranger_) return;
     told_stranger_ = link_.newest_stranger();
     say_(fmt::format("{}: packets of {} are ignored: it is not the flight controller's address", where_, told_stranger_));
@@ -70,6 +73,7 @@ class MavlinkFeed final : public ImuFeed {
   Time next_try_{};
   const WakeEvent wake_;
   std::atomic<bool> stopped_ = false;
+  bool told_refused_ = false;
 };
 
 /// Another process's readings without its images.
