@@ -64,7 +64,7 @@ bool TiltCheck::take(const BiasEstimate& now, bool contradicted) {
   (away ? refuted_s_ : confirmed_s_) += dt_s;
   (away ? confirmed_s_ : refuted_s_) = 0;
   if (refuted_s_ > kConfirmed_s && !refuted_) {  // a second start would be doubted like the first one
-    refuted_ = before_;
+    if ((before_->t - *begun_).seconds() > kSettled_s) refuted_ = before_;
     return true;
   }
   if (confirmed_s_ <= kConfirmed_s) return false;

@@ -59,6 +59,7 @@ class TimeAlignment {
   Duration correction_{}, found_{};
   double found_sigma_s_ = kUnknown_s;  ///< of the best solution that agrees with what was found
   double line_delay_s_ = 0, jitter_s_ = 0, sigma_s_ = kUnknown_s;
+  bool suspected_ = false;  ///< by the newest solution, what was found is off
   int solves_ = 0, off_ = 0;  ///< and those in a row that found the offset off
   std::optional<Time> changed_;                      ///< the correction, last
   std::optional<GyroAlignmentEstimate> fits_turns_;  ///< the newest solution, where the tracks do
