@@ -5,6 +5,8 @@
 #include <cassert>
 #include <utility>
 
+#include "fbvins/estimator/imu_factor.hpp"
+
 namespace fbvins {
 
 namespace {
@@ -25,6 +27,23 @@ void keep_most_observed(std::vector<const Landmark*>& landmarks, int limit) {
     const std::size_t n = l->observations.size();
     return n < least && (n + 1 < least || spare-- <= 0);
   });
+}
+
+/// Those of readings first, then kind by kind.
+void fill_factors(const FrameList& frames, std::vector<std::shared_ptr<const Factor>>& out) {
+  out.clear();
+  for (int i = 1; i < frames.size(); ++i)
+    if (const auto& imu = frames[i].imu; imu && !imu->empty())
+      out.push_back(std::make_shared<const ImuFactor>(frames[i - 1].id, frames[i].id, imu));
+  std::vector<FrameFactor> brought;
+  for (const Frame& f : frames)
+    for (const FrameFactor& factor : f.factors) {
+      const std::vector<Variable> variables = factor.factor->variables();
+      const auto is_here = [&](const Variable& v) { return !v.is_of_frame() || frames.index_of(v.frame) >= 0; };
+      if (std::all_of(variables.begin(), variables.end(), is_here)) brought.push_back(factor);
+    }
+  std::stable_sort(brought.begin(), brought.end(), [](const FrameFactor& a, const FrameFactor& b) { return a.order < b.order; });
+  for (FrameFactor& factor : brought) out.push_back(std::move(factor.factor));
 }
 
 }  // namespace
@@ -84,11 +103,9 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
 
 void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& out) const {
   out.frames.clear();
-  for (const Frame& f : frames_) {
-    out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior, f.imu, f.standstill, f.surfaces, -1});
-    if (f.surfaces) out.frames.back().surfaces_of = frames_.index_of(f.surfaces->reference);
-    if (out.frames.back().surfaces_of < 0) out.frames.back().surfaces = nullptr;
-  }
+  for (const Frame& f : frames_)
+    out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior});
+  fill_factors(frames_, out.factors);
   out.tilt = tilt_;
   out.calibration = calibration;
   out.weights = weights_;
@@ -154,8 +171,26 @@ void SlidingWindow::forget_observations(FrameId frame, const Calibration& calibr
 }
 
 void SlidingWindow::forget_frame(int index) {
+  const FrameId id = frames_[index].id;
   frames_.remove(index);
+  for (Frame& frame : frames_)
+    std::erase_if(frame.factors, [&](const FrameFactor& f) { return f.factor->touches(id); });  // they are in the prior
   for (int& f : prior_.frames) f -= f > index;
+}
+
+/// Of all frames: a factor of another frame may be about this one, too.
+void SlidingWindow::take_over_factors(const Frame& leaving, Frame& next) {
+  const DroppedFrame dropped{leaving.id, next.id, next.state.T_FB.inverse() * leaving.state.T_FB};
+  std::vector<FrameFactor> taken;
+  for (const FrameFactor& f : leaving.factors)
+    if (auto left = f.factor->without(dropped)) taken.push_back({f.order, std::move(left)});
+  next.factors.insert(next.factors.begin(), taken.begin(), taken.end());
+  for (Frame& frame : frames_) {
+    if (frame.id == leaving.id) continue;
+    for (FrameFactor& f : frame.factors)
+      if (f.factor->touches(leaving.id)) f.factor = f.factor->without(dropped);
+    std::erase_if(frame.factors, [](const FrameFactor& f) { return f.factor == nullptr; });
+  }
 }
 
 void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
@@ -175,6 +210,7 @@ void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
     } else {
       next.imu.reset();
     }
+    take_over_factors(leaving, next);
     forget_observations(leaving.id, calibration);
   }
   forget_frame(index);

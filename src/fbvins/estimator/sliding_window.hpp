@@ -73,6 +73,7 @@ class SlidingWindow {
   void drop_prior(Landmark& landmark);
   void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
   void forget_observations(FrameId frame, const Calibration& calibration);
+  void take_over_factors(const Frame& leaving, Frame& next);
   void forget_frame(int index);
   void remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving, std::span<const Mat3> information);
   void keep_newest_observations(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,

@@ -20,11 +20,9 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
   out.landmarks.clear();
   out.observations.clear();
   out.landmark_priors = problem.landmark_priors;
-  for (int i = 0; i < out.frame_count(); ++i) {
-    if (i != leaving && i != leaving + 1) out.frames[i].imu = nullptr;
-    if (i != leaving) out.frames[i].standstill = false;
-    if (i != leaving && out.frames[i].surfaces_of != leaving) out.frames[i].surfaces = nullptr;
-  }
+  out.factors.clear();
+  for (const std::shared_ptr<const Factor>& factor : problem.factors)
+    if (factor->touches(problem.frames[leaving].id)) out.factors.push_back(factor);
   for (const LeavingLandmark& l : landmarks) {
     WindowLandmark landmark = problem.landmarks[l.index];
     const auto first = problem.observations.begin() + landmark.first_observation;
@@ -39,10 +37,9 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
 std::vector<std::uint8_t> touched_frames(const WindowProblem& problem) {
   std::vector<std::uint8_t> touched(problem.frames.size(), 0);
   for (int frame : problem.prior.frames) touched[frame] = 1;
-  for (std::size_t i = 1; i < problem.frames.size(); ++i)
-    if (problem.frames[i].imu != nullptr) touched[i - 1] = touched[i] = 1;
-  for (std::size_t i = 0; i < problem.frames.size(); ++i)
-    if (problem.frames[i].surfaces != nullptr) touched[i] = touched[problem.frames[i].surfaces_of] = 1;
+  for (const std::shared_ptr<const Factor>& factor : problem.factors)
+    for (const Variable& v : factor->variables())
+      if (v.is_of_frame()) touched[problem.index_of(v.frame)] = 1;
   for (const WindowLandmark& l : problem.landmarks) {
     touched[l.host] = 1;
     for (int k = 0; k < l.observation_count; ++k) touched[problem.observations[l.first_observation + k].frame] = 1;

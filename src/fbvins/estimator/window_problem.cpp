@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/window_problem.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace fbvins {
@@ -14,6 +15,11 @@ Vec18 calibration_displacement(const Calibration& calibration, const Calibration
   dx(kTimeOffsetIndex) = calibration.time_offset_s - from.time_offset_s;
   dx(kLineDelayIndex) = calibration.line_delay_s - from.line_delay_s;
   return dx;
+}
+
+bool Factor::touches(FrameId frame) const {
+  const std::vector<Variable> all = variables();
+  return std::any_of(all.begin(), all.end(), [&](const Variable& v) { return v.is_of_frame() && v.frame == frame; });
 }
 
 int WindowProblem::index_of(FrameId id) const {

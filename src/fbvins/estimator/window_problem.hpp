@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
-#include "fbvins/estimator/frame_list.hpp"
+#include "fbvins/estimator/factor.hpp"
 #include "fbvins/estimator/landmark_prior.hpp"
 #include "fbvins/estimator/reprojection.hpp"
 #include "fbvins/estimator/tilt.hpp"
 #include "fbvins/imu/nav_state.hpp"
-#include "fbvins/imu/preintegration.hpp"
 #include "fbvins/optim/quadratic_prior.hpp"
 
 namespace fbvins {
@@ -24,18 +23,12 @@ struct WindowFrame {
   /// State when the prior first named this frame: linearisation point and origin of the prior (W9).
   NavState<G> first_estimate;
   bool in_prior = false;
-  /// From the frame before this one; null where the chain is broken or the prior holds it.
-  std::shared_ptr<const Preintegration> imu;
-  bool standstill = false;
-  std::shared_ptr<const SurfaceView> surfaces;  ///< null where there are none
-  int surfaces_of = -1;                         ///< index of their reference
 };
 
 /// Terms and weights that are not measurements of a frame.
 struct WindowWeights {
   double huber_sigma = 2.0;
   double gravity_mps2 = 9.81;
-  double standstill_velocity_sigma_mps = 0.01;
   double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
   bool images_show_scale = true;         ///< false: of one camera, which shows everything else
   bool at_first_estimates = false;       ///< Jacobians of frames in the prior are taken at their first estimates
@@ -74,6 +67,8 @@ struct WindowProblem {
   std::vector<WindowLandmark> landmarks;
   std::vector<WindowObservation> observations;
   std::vector<LandmarkPrior> landmark_priors;
+  /// All but the prior and what landmarks give, whose frames are all in the window: those of a kind are neighbours, by frame.
+  std::vector<std::shared_ptr<const Factor>> factors;
   Tilt tilt;
   Calibration calibration;
   WindowPrior prior;
@@ -83,6 +78,8 @@ struct WindowProblem {
   int frame_count() const { return static_cast<int>(frames.size()); }
   /// -1 where there is none.
   int index_of(FrameId id) const;
+  /// Of a frame that is in the window.
+  const WindowFrame& frame(FrameId id) const { return frames[static_cast<std::size_t>(index_of(id))]; }
   /// Where Jacobians of a frame are taken.
   NavState<G> linearisation_point(int frame) const {
     const WindowFrame& f = frames[static_cast<std::size_t>(frame)];

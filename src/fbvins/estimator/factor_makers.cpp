@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one place where factors are registered.
+#include "fbvins/estimator/factor_maker.hpp"
+#include "fbvins/estimator/standstill_factor.hpp"
+#include "fbvins/estimator/surface_view.hpp"
+
+namespace fbvins {
+
+FactorMakers::FactorMakers(const StereoRig& rig, const EstimatorOptions&) {
+  makers_.push_back(std::make_unique<StandstillMaker>());
+  if (rig.depth) makers_.push_back(std::make_unique<SurfaceMaker>(rig));
+}
+
+std::vector<FrameFactor> FactorMakers::make(const NewFrame& frame) {
+  std::vector<FrameFactor> out;
+  for (std::size_t order = 0; order < makers_.size(); ++order)
+    for (std::shared_ptr<const Factor>& factor : makers_[order]->make(frame))
+      out.push_back({static_cast<int>(order), std::move(factor)});
+  return out;
+}
+
+}  // namespace fbvins
