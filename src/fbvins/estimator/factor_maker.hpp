@@ -18,7 +18,7 @@ struct NewFrame {
   const TrackedFrame& tracked;
   const std::vector<TrackedFeature>& features;  ///< of the cameras to believe
   const Frame& frame;                           ///< with its predicted state
-  const SlidingWindow& window;                  ///< without it
+  SlidingWindow& window;                        ///< without it; for makers that bring a variable along (add_own)
   const Calibration& calibration;
   bool standstill = false;
   bool of_start = false;  ///< one of the frames from which the window is begun

@@ -57,6 +57,36 @@ void SlidingWindow::clear() {
   known_.clear();
   prior_ = {};
   tilt_ = {};
+  own_.clear();
+}
+
+int SlidingWindow::add_own(std::string name, const Eigen::VectorXd& value) {
+  own_.push_back({next_own_, std::move(name), value, true});
+  return next_own_++;
+}
+
+const OwnVariable* SlidingWindow::own(int number) const {
+  const auto it = std::find_if(own_.begin(), own_.end(), [&](const OwnVariable& v) { return v.number == number; });
+  return it == own_.end() ? nullptr : &*it;
+}
+
+void SlidingWindow::end_own(int number) {
+  for (OwnVariable& v : own_)
+    if (v.number == number) v.is_wanted = false;
+  forget_unused_own();
+}
+
+void SlidingWindow::forget_unused_own() {
+  std::erase_if(own_, [&](const OwnVariable& v) {
+    const auto names_it = [&](const FrameFactor& f) {
+      const std::vector<Variable> variables = f.factor->variables();
+      return std::find(variables.begin(), variables.end(), Variable::own_one(v.number)) != variables.end();
+    };
+    return !v.is_wanted && std::find(prior_.own.begin(), prior_.own.end(), v.number) == prior_.own.end() &&
+           std::none_of(frames_.begin(), frames_.end(), [&](const Frame& frame) {
+             return std::any_of(frame.factors.begin(), frame.factors.end(), names_it);
+           });
+  });
 }
 
 void SlidingWindow::set_prior(WindowPrior prior) {
@@ -106,6 +136,7 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
   for (const Frame& f : frames_)
     out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior});
   fill_factors(frames_, out.factors);
+  out.own = own_;
   out.tilt = tilt_;
   out.calibration = calibration;
   out.weights = weights_;
@@ -146,6 +177,9 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
 
 void SlidingWindow::take_estimates(const WindowProblem& solved) {
   tilt_ = solved.tilt;
+  for (const OwnVariable& v : solved.own)
+    for (OwnVariable& own : own_)
+      if (own.number == v.number) own.value = v.value;
   for (const WindowFrame& f : solved.frames)
     if (const int i = frames_.index_of(f.id); i >= 0) frames_[i].state = f.state;
   for (int i = 1; i < frames_.size(); ++i) {
@@ -176,6 +210,7 @@ void SlidingWindow::forget_frame(int index) {
   for (Frame& frame : frames_)
     std::erase_if(frame.factors, [&](const FrameFactor& f) { return f.factor->touches(id); });  // they are in the prior
   for (int& f : prior_.frames) f -= f > index;
+  forget_unused_own();
 }
 
 /// Of all frames: a factor of another frame may be about this one, too.

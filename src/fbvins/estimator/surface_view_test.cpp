@@ -114,7 +114,6 @@ TEST(SurfaceFinder, WithoutDepthsThereIsNothing) {
   EXPECT_FALSE(SurfaceFinder(rig()).find(blind, window_of(false), calibration()));
   EXPECT_FALSE(SurfaceFinder(rig()).find(frame_at(2, kThere, false), FrameList{}, calibration()));
   const StereoRig pair = with_cameras(rig(), {rig().mounted(0), {rig().left, {rig().T_BC0.q, Vec3(0, 0, 0)}}});
-  EXPECT_FALSE(SurfaceFinder(pair).has_sensor());
   EXPECT_FALSE(SurfaceFinder(pair).find(frame_at(2, kThere, false), window_of(false), calibration()));
 }
 

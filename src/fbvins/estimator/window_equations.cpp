@@ -14,16 +14,9 @@ constexpr double kDampingOfSingular = 1e-5;
 double prior_term(const WindowProblem& w, NormalEquations* out) {
   const WindowPrior& prior = w.prior;
   if (prior.empty()) return 0;
-  const Eigen::VectorXd dx = w.prior_displacement();
+  const Eigen::VectorXd dx = w.displacement(prior);
   if (out == nullptr) return prior.quadratic.cost(dx);
-  const WindowLayout& at = out->layout;
-  std::vector<int> rows;
-  rows.reserve(static_cast<std::size_t>(prior.quadratic.size()));
-  for (int k = 0; prior.with_tilt && k < kTiltSize; ++k) rows.push_back(at.tilt_row() + k);
-  if (prior.with_calibration)
-    for (int k = 0; k < kCalibrationSize; ++k) rows.push_back(at.calibration_row() + k);
-  for (int frame : prior.frames)
-    for (int k = 0; k < 15; ++k) rows.push_back(at.row_of(frame, k));
+  const std::vector<int> rows = rows_of(w, out->layout, prior);
   const Eigen::VectorXd gradient = prior.quadratic.gradient(dx);
   for (int c = 0; c < prior.quadratic.size(); ++c) {
     out->g(rows[c]) += gradient(c);
@@ -65,6 +58,36 @@ void fix_inactive_calibration(const WindowWeights& weights, NormalEquations& out
 }
 
 }  // namespace
+
+int row_of(const WindowProblem& window, const WindowLayout& at, const Variable& v) {
+  switch (v.kind) {
+    case Variable::Kind::pose: return at.pose_row(window.index_of(v.frame));
+    case Variable::Kind::motion: return at.speed_bias_row(window.index_of(v.frame));
+    case Variable::Kind::tilt: return at.tilt_row();
+    case Variable::Kind::calibration: return at.calibration_row();
+    case Variable::Kind::own: break;
+  }
+  int row = at.own_row();
+  for (const OwnVariable& own : window.own) {
+    if (own.number == v.own) break;
+    row += static_cast<int>(own.value.size());
+  }
+  return row;
+}
+
+std::vector<int> rows_of(const WindowProblem& window, const WindowLayout& at, const WindowPrior& prior) {
+  std::vector<int> rows;
+  rows.reserve(static_cast<std::size_t>(prior.frames_row()) + 15 * prior.frames.size());
+  const auto add = [&](int begin, int size) {
+    for (int k = 0; k < size; ++k) rows.push_back(begin + k);
+  };
+  if (prior.with_tilt) add(at.tilt_row(), kTiltSize);
+  if (prior.with_calibration) add(at.calibration_row(), kCalibrationSize);
+  for (const int number : prior.own) add(row_of(window, at, Variable::own_one(number)), window.size_of(Variable::own_one(number)));
+  for (const int frame : prior.frames)
+    for (int k = 0; k < 15; ++k) rows.push_back(at.row_of(frame, k));
+  return rows;
+}
 
 void PairTable::fill(const WindowProblem& window, bool with_first_estimates) {
   n_ = window.frames.size();

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
@@ -49,17 +50,29 @@ using Vec18 = Eigen::Matrix<double, kCalibrationSize, 1>;
 /// `calibration` minus `from`, as a perturbation of `from`.
 Vec18 calibration_displacement(const Calibration& calibration, const Calibration& from);
 
-/// A quadratic over, in this order, the tilt, the calibration (if estimated) and 15 numbers (p, theta, v, bg, ba)
-/// of some frames. The tilt is measured from zero, frames from their first estimates.
+/// A variable that factors bring along: it lives as long as one of them names it, or their maker wants it. A vector; what is not one is
+/// estimated as the difference from a value that its factors keep.
+struct OwnVariable {
+  int number = -1;  ///< never used again
+  std::string name;
+  Eigen::VectorXd value;
+  bool is_wanted = false;  ///< also while nothing of the window measures it
+};
+
+/// A quadratic over, in this order, the tilt, the calibration (if estimated), the factors' own variables and 15 numbers
+/// (p, theta, v, bg, ba) of some frames. The tilt and own variables are measured from zero, frames from their first estimates.
 struct WindowPrior {
   QuadraticPrior quadratic;
+  std::vector<int> own = {};  ///< numbers, ascending
+  int own_size = 0;           ///< of all of them
   std::vector<int> frames;  ///< indices into WindowProblem::frames
   bool with_tilt = false;
   bool with_calibration = false;
   Calibration calibration;  ///< linearisation point of the calibration
   bool empty() const { return quadratic.size() == 0; }
   int calibration_row() const { return with_tilt ? kTiltSize : 0; }
-  int frames_row() const { return calibration_row() + (with_calibration ? kCalibrationSize : 0); }
+  int own_row() const { return calibration_row() + (with_calibration ? kCalibrationSize : 0); }
+  int frames_row() const { return own_row() + own_size; }
 };
 
 struct WindowProblem {
@@ -69,6 +82,7 @@ struct WindowProblem {
   std::vector<LandmarkPrior> landmark_priors;
   /// All but the prior and what landmarks give, whose frames are all in the window: those of a kind are neighbours, by frame.
   std::vector<std::shared_ptr<const Factor>> factors;
+  std::vector<OwnVariable> own;  ///< numbers ascend
   Tilt tilt;
   Calibration calibration;
   WindowPrior prior;
@@ -90,8 +104,14 @@ struct WindowProblem {
   Vec2 residual(const WindowLandmark& landmark, const WindowObservation& observation) const;
   /// Whitened distance of a landmark that has a prior from it, at the current estimate.
   Vec3 distance_to_prior(const WindowLandmark& landmark) const;
-  /// Displacement of the prior's variables from its linearisation point.
-  Eigen::VectorXd prior_displacement() const;
+  /// Of one that it has.
+  const OwnVariable& own_variable(int number) const;
+  /// How far the variables of a prior are from its origin. Zero for frames that were in no prior before: it begins at their state.
+  Eigen::VectorXd displacement(const WindowPrior& from) const;
+  /// How many numbers a step of the variable has; 0 where it is not estimated.
+  int size_of(const Variable& variable) const;
+  /// Moves it by a step.
+  void move(const Variable& variable, const Eigen::Ref<const Eigen::VectorXd>& step);
 };
 
 }  // namespace fbvins

@@ -149,6 +149,7 @@ inline Window make_window(bool calibrating) {
   w.problem.prior.quadratic.H = weight.cwiseAbs2().asDiagonal();
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(weight.size());
   w.problem.prior.frames = {0};
+  w.problem.frames[0].in_prior = true;
   w.problem.prior.with_tilt = true;
   w.problem.prior.with_calibration = calibrating;
   w.problem.prior.calibration = w.problem.calibration;

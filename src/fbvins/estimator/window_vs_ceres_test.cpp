@@ -275,6 +275,7 @@ Window window_at_rest(std::uint64_t seed) {
   w.problem.prior.quadratic.H = Eigen::MatrixXd::Identity(15, 15) * 1e6;
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(15);
   w.problem.prior.frames = {0};
+  w.problem.frames[0].in_prior = true;
   return w;
 }
 
