@@ -323,6 +323,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
                         .after_dark = monitor_.settling(),
                         .clipped = reading_noise_.clipped(),
+                        .doubted_sensor = factors_.doubt(),
                         .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
 }
 
@@ -378,8 +379,10 @@ void Estimator::publish(Odometry& out) {
   const bool moved_along = !monitor_.contradicted() && carried_.take_reset();
   if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
-  if (out.health.state == HealthState::good && published_.pending_too_large()) settle_correction(level.T_FB, out);
-  if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
+  // A sensor that is left out does not trouble the pose.
+  const auto is_fine = [&] { return out.health.state == HealthState::good || out.health.reason == HealthReason::range_disagrees; };
+  if (is_fine() && published_.pending_too_large()) settle_correction(level.T_FB, out);
+  if (!is_fine() && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);

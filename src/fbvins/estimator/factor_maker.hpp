@@ -9,6 +9,7 @@
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/factor.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
@@ -28,6 +29,8 @@ class FactorMaker {
  public:
   virtual ~FactorMaker() = default;
   virtual std::vector<std::shared_ptr<const Factor>> make(const NewFrame& frame) = 0;
+  /// What the sensor is doubted for, whose readings are left out.
+  virtual HealthReason doubt() const { return HealthReason::none; }
 };
 
 /// In the order in which their factors are added up.
@@ -35,6 +38,8 @@ class FactorMakers {
  public:
   FactorMakers(const StereoRig& rig, const EstimatorOptions& options);
   std::vector<FrameFactor> make(const NewFrame& frame);
+  /// Of the first sensor that is.
+  HealthReason doubt() const;
 
  private:
   std::vector<std::unique_ptr<FactorMaker>> makers_;

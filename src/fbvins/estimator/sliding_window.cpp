@@ -206,6 +206,9 @@ void SlidingWindow::forget_observations(FrameId frame, const Calibration& calibr
 
 void SlidingWindow::forget_frame(int index) {
   const FrameId id = frames_[index].id;
+  if (index + 1 < frames_.size())  // what it has brought of other frames stays
+    for (FrameFactor& f : frames_[index].factors)
+      if (!f.factor->touches(id)) frames_[index + 1].factors.push_back(std::move(f));
   frames_.remove(index);
   for (Frame& frame : frames_)
     std::erase_if(frame.factors, [&](const FrameFactor& f) { return f.factor->touches(id); });  // they are in the prior
@@ -218,7 +221,7 @@ void SlidingWindow::take_over_factors(const Frame& leaving, Frame& next) {
   const DroppedFrame dropped{leaving.id, next.id, next.state.T_FB.inverse() * leaving.state.T_FB};
   std::vector<FrameFactor> taken;
   for (const FrameFactor& f : leaving.factors)
-    if (auto left = f.factor->without(dropped)) taken.push_back({f.order, std::move(left)});
+    if (auto left = f.factor->touches(leaving.id) ? f.factor->without(dropped) : f.factor) taken.push_back({f.order, std::move(left)});
   next.factors.insert(next.factors.begin(), taken.begin(), taken.end());
   for (Frame& frame : frames_) {
     if (frame.id == leaving.id) continue;
@@ -246,6 +249,7 @@ void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
       next.imu.reset();
     }
     take_over_factors(leaving, next);
+    leaving.factors.clear();
     forget_observations(leaving.id, calibration);
   }
   forget_frame(index);
