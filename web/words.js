@@ -24,6 +24,7 @@ const REASONS = {
   imu_clipped: "the IMU is at the end of its range",
   imu_vibration: "strong vibration spoils the IMU's readings",
   correction_pending: "the pose is being corrected",
+  range_disagrees: "the rangefinder disagrees: it is not used",
 };
 
 export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }

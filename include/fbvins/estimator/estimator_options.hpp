@@ -58,10 +58,23 @@ struct StandingOptions {
   }
 };
 
+/// Readings of a rangefinder (docs/rangefinder.md).
+struct RangefinderOptions {
+  bool enabled = true;
+  double floor_sigma_m = 0.015;
+
+  template <class V>
+  void visit(V&& v) {
+    v("enabled", enabled, "", "readings of a rangefinder constrain the height above the floor");
+    v("floor_sigma_m", floor_sigma_m, "m", "standard deviation of a level floor's unevenness, in addition to the readings'", 0.001, 0.5);
+  }
+};
+
 struct EstimatorOptions {
   KeyframeOptions keyframes;
   KnownLandmarkOptions known_landmarks;
   StandingOptions standing;
+  RangefinderOptions rangefinder;
   int max_iterations = 4;
   int max_landmarks = 300;
   double gravity_mps2 = 9.81;
@@ -98,6 +111,7 @@ struct EstimatorOptions {
     v.group("keyframes", keyframes, "the sliding window");
     v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
     v.group("standing", standing, "a vehicle that stands level before it flies");
+    v.group("rangefinder", rangefinder, "a beam to the floor");
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);

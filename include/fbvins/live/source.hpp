@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
@@ -23,7 +25,20 @@ class SensorInput {
   virtual void push(StereoFrame frame) = 0;
   /// A measurement for the map, on the cameras' clock. Who has no map leaves it.
   virtual void push_anchor(Anchor anchor) { (void)anchor; }
+  /// A rangefinder's reading, on the cameras' clock. Who looks at images and the IMU alone leaves it.
+  virtual void push_range(const RangeSample& reading) { (void)reading; }
 };
+
+/// As what it is.
+inline void push_event(SensorInput& input, SensorEvent event) {
+  struct {
+    SensorInput& to;
+    void operator()(const ImuSample& sample) const { to.push(sample); }
+    void operator()(StereoFrame& frame) const { to.push(std::move(frame)); }
+    void operator()(const RangeSample& reading) const { to.push_range(reading); }
+  } push{input};
+  std::visit(push, event);
+}
 
 /// What a check of live sensors says: what was seen, and what to do where it is not fine, or could be better; one sentence.
 struct SensorFinding {

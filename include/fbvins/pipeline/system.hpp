@@ -73,7 +73,7 @@ class System {
   void on_map_update(std::function<void(const MapUpdate&)> callback);
 
   /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded). Returns the error of the
-  /// stage that failed, if one has; the event is dropped then.
+  /// stage that failed, if one has; the event is dropped then. An error, and no change, for an impossible range.
   Result<void> push(SensorEvent event);
   /// A measurement for the mapper, of the images' clock; between the events, best before the next image. One that comes late is
   /// used as long as the map remembers the motion then (some seconds). An error, and no change, for one that is impossible.

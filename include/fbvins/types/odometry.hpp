@@ -41,8 +41,9 @@ enum class HealthReason {
   imu_clipped,         ///< an axis of the IMU is at the end of its range
   imu_vibration,       ///< readings are shaken so much that they say little
   correction_pending,  ///< a correction larger than a good pose may be wrong is published step by step
+  range_disagrees,     ///< a rangefinder's readings lie on no floor: they are left out
 };
-inline constexpr HealthReason kLastHealthReason = HealthReason::correction_pending;
+inline constexpr HealthReason kLastHealthReason = HealthReason::range_disagrees;
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);

@@ -13,6 +13,7 @@
 #include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
+#include "fbvins/types/range.hpp"
 
 namespace fbvins {
 
@@ -22,6 +23,7 @@ struct SensorPacket {
   StereoFrame frame;
   ImuSegment imu;
   std::vector<Anchor> anchors = {};  ///< that came since the image before, of any stamp
+  std::vector<RangeSample> ranges = {};  ///< since the image before
 };
 
 /// Where a feature is seen in one camera.
@@ -98,6 +100,7 @@ struct TrackedFrame {
   std::shared_ptr<const DepthImage> depth = {};      ///< of a rig with a depth sensor
   ExposureOffsets offsets = {};                      ///< of the cameras' images; filled by the system
   std::vector<Anchor> anchors = {};                  ///< for the map
+  std::vector<RangeSample> ranges = {};              ///< since the image before; filled by the system
   bool after_clock_step = false;                     ///< as in StereoFrame; filled by the system
 };
 

@@ -219,7 +219,7 @@ void FaultyInput::pass(SensorEvent event, Time t) {
 
 void FaultyInput::deliver_held() {
   held_until_.reset();
-  for (SensorEvent& event : std::exchange(held_, {})) std::visit([&](auto& e) { input_.push(std::move(e)); }, event);
+  for (SensorEvent& event : std::exchange(held_, {})) push_event(input_, std::move(event));
 }
 
 }  // namespace fbvins

@@ -126,6 +126,8 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o, const std::fun
   World world = build_world(o.world, plan_for(o, path), path, seed);
   if (change) change(world, s);
   s.world = std::make_shared<const World>(std::move(world));
+  s.ranges = simulate_ranges(s.flight, *s.world, s.world_from_flight, body_in_vehicle(s.rig, o.flight.camera_pitch_deg).conjugate().toRotationMatrix(),
+                             o.range, s.start, seed);
   s.recorder = std::make_shared<FlightRecorder>(
       o, s.rig, [flight = s.flight](double t) { return flight.at(t); }, s.world_from_flight, s.world);
   return s;
@@ -141,6 +143,7 @@ DatasetContents contents_of(Simulation simulation, const std::string& name) {
   const Duration offset = Duration::from_seconds(simulation.rig.time_offset_s);
   contents.rig = simulation.calibrated;
   contents.imu = simulation.imu.samples;
+  contents.ranges = simulation.ranges;
   for (const TrueState& s : simulation.imu.truth) contents.ground_truth.push_back({s.t, s.T_WB, s.v_WB, s.bias});
   const StereoRig& rig = simulation.rig;
   std::vector<Time> stamps;

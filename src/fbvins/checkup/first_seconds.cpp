@@ -25,6 +25,7 @@ void FirstSeconds::push(const SensorEvent& event) {
     samples_.push_back(*sample);
     return;
   }
+  if (std::holds_alternative<RangeSample>(event)) return;  // not examined
   const StereoFrame& frame = std::get<StereoFrame>(event);
   images_.push_back(frame.t);
   const double due_s = kLook_s * static_cast<double>(kept_.size()) / kKept;

@@ -265,6 +265,7 @@ bool EvidenceGatherer::push(const SensorEvent& event) {
     s.evidence.imu.push_back(corrected(*sample, s.evidence.rig.imu_noise.axes));
     return true;
   }
+  if (std::holds_alternative<RangeSample>(event)) return true;  // not examined
   if (s.enough()) return false;
   StereoFrame frame = std::get<StereoFrame>(event);
   s.evidence.stamps.push_back(frame.t);

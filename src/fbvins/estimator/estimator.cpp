@@ -30,8 +30,6 @@ constexpr double kMaxScaleSigmaAtStart = 0.15;
 constexpr double kMaxBiasSigmasAtStart = 2.8;
 /// For so long: axes and scale of a gyroscope that nobody has calibrated look like a bias that changes.
 constexpr double kBiasRefused_s = 1;
-/// With fewer landmarks surfaces are compared as well.
-constexpr std::ptrdiff_t kEnoughLandmarks = 25;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
@@ -47,7 +45,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset,
                       before ? before->time_offset : std::nullopt),
       exposures_(rig),
-      surfaces_(rig),
+      factors_(rig, options_),
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
@@ -151,8 +149,12 @@ void Estimator::refuse_start(Odometry& out) {
 
 void Estimator::open_window(const InitialSolution& start) {
   window_.clear();
-  for (std::size_t i = 0; i < start.frames.size(); ++i)
-    window_.add_frame(frame_of_start(start, i, imu_noise_), start.frames[i].features, calibration_);
+  for (std::size_t i = 0; i < start.frames.size(); ++i) {
+    const TrackedFrame& tracked = start.frames[i];
+    Frame frame = frame_of_start(start, i, imu_noise_);
+    frame.factors = factors_.make({tracked, tracked.features, frame, window_, calibration_, start.from_rest, true});
+    window_.add_frame(std::move(frame), tracked.features, calibration_);
+  }
   const NavState<G>& first = window_.frames().oldest().state;
   WindowPrior prior = first_frame_prior(first, start.biases);
   if (weights_of(options_).calibrating()) prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
@@ -211,9 +213,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   Frame predicted = predict(frame, imu);
   const std::vector<TrackedFeature> features = check_readings(frame, imu, predicted);
   out.imu_noise = imu.noise;
-  predicted.standstill = standstill;
-  if (surfaces_.has_sensor() && std::ssize(landmark_observations(window_, features, calibration_)) < kEnoughLandmarks)
-    predicted.surfaces = surfaces_.find(predicted, window_.frames(), calibration_);
+  predicted.factors = factors_.make({frame, features, predicted, window_, calibration_, standstill});
   window_.add_frame(std::move(predicted), features, calibration_);
   stats.prepare_ms = timer.lap_ms();
   const WindowSolution& solution = solve(out.odometry, LmOptions{.max_iterations = options_.max_iterations});
@@ -323,6 +323,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
                         .after_dark = monitor_.settling(),
                         .clipped = reading_noise_.clipped(),
+                        .doubted_sensor = factors_.doubt(),
                         .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
 }
 
@@ -378,8 +379,10 @@ void Estimator::publish(Odometry& out) {
   const bool moved_along = !monitor_.contradicted() && carried_.take_reset();
   if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
-  if (out.health.state == HealthState::good && published_.pending_too_large()) settle_correction(level.T_FB, out);
-  if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
+  // A sensor that is left out does not trouble the pose.
+  const auto is_fine = [&] { return out.health.state == HealthState::good || out.health.reason == HealthReason::range_disagrees; };
+  if (is_fine() && published_.pending_too_large()) settle_correction(level.T_FB, out);
+  if (!is_fine() && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);

@@ -13,6 +13,7 @@
 #include "fbvins/estimator/carried_state.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/exposures.hpp"
+#include "fbvins/estimator/factor_maker.hpp"
 #include "fbvins/estimator/frame_contract.hpp"
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
@@ -22,7 +23,6 @@
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/state_uncertainty.hpp"
-#include "fbvins/estimator/surface_view.hpp"
 #include "fbvins/estimator/time_alignment.hpp"
 #include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/imu/reading_noise.hpp"
@@ -91,7 +91,7 @@ class Estimator {
   StateUncertainty uncertainty_;          ///< as of the last usable solve
   TimeAlignment time_alignment_;
   Exposures exposures_;
-  SurfaceFinder surfaces_;
+  FactorMakers factors_;
   TrackedFrame referred_;  ///< the newest frame, where not all of it was seen at its stamp
   Initialiser initialiser_;
   RestDetector rest_;

@@ -65,7 +65,6 @@ Frame frame_of_start(const InitialSolution& start, std::size_t number, const Imu
   Frame f = without_state(start.frames[number]);
   f.state = start.states[number];
   f.keyframe = start.from_rest ? number == 0 : number % 2 == 0;
-  f.standstill = start.from_rest;
   if (number == 0) return f;
   Preintegration imu(noise, f.state.bias);
   imu.integrate(start.frames[number].imu);

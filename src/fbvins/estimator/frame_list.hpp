@@ -9,23 +9,12 @@
 
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
+#include "fbvins/estimator/factor.hpp"
 #include "fbvins/imu/nav_state.hpp"
 #include "fbvins/imu/preintegration.hpp"
 #include "fbvins/types/image.hpp"
 
 namespace fbvins {
-
-/// A place that a frame sees on a surface of an earlier one.
-struct SurfaceDistance {
-  Vec3 p_B;                ///< in the body of the frame, m
-  Vec3 normal_B, on_it_B;  ///< of the surface, and a point of it, in the body of the earlier frame
-  double inverse_sigma_1pm = 0;
-};
-
-struct SurfaceView {
-  FrameId reference;  ///< the earlier frame
-  std::vector<SurfaceDistance> distances;
-};
 
 /// A frame of the window. `imu` joins it to the frame before it in the window; it is replaced, never modified, so that
 /// window problems can share it.
@@ -36,9 +25,8 @@ struct Frame {
   NavState<G> first_estimate;
   bool in_prior = false;
   bool keyframe = false;
-  bool standstill = false;
   std::shared_ptr<const Preintegration> imu;
-  std::shared_ptr<const SurfaceView> surfaces;  ///< where there are too few features
+  std::vector<FrameFactor> factors;  ///< beside the readings'; by order
   std::shared_ptr<const DepthImage> depth;
   StereoFrame images;  ///< of keyframes, until they have been handed on
 };

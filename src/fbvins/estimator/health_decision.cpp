@@ -55,6 +55,8 @@ Health decide_health(const HealthEvidence& e, const HealthLimits& limits) {
       // A pose that is right by now, and was not published
       {e.correction == HealthEvidence::Correction::pending, degraded, R::correction_pending},
       {e.correction == HealthEvidence::Correction::made, degraded, R::contradiction},
+      // A pose that is as good as without that sensor
+      {e.doubted_sensor != R::none, degraded, e.doubted_sensor},
   };
   for (const Rule& rule : order)
     if (rule.holds) return {rule.state, rule.reason, rule.without_cameras};

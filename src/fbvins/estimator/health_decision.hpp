@@ -44,6 +44,7 @@ struct HealthEvidence {
   bool contradiction = false;
   bool hopeless = false;           ///< and the estimate cannot recover from it
   std::uint8_t wrong_cameras = 0;  ///< bits, as in Health; they contradict the others and the readings
+  HealthReason doubted_sensor = HealthReason::none;  ///< another one that contradicts them and is left out
   enum class Correction { none, pending, made } correction = Correction::none;  ///< made: at once, after trouble
 };
 

@@ -38,6 +38,7 @@ const std::vector<Cause> kCauses = {
     {[](HealthEvidence& e) { e.contradiction = true; }, degraded(HealthReason::contradiction)},
     {[](HealthEvidence& e) { e.gyro_vibration_radps = 0.4; }, degraded(HealthReason::imu_vibration)},
     {[](HealthEvidence& e) { e.correction = HealthEvidence::Correction::pending; }, degraded(HealthReason::correction_pending)},
+    {[](HealthEvidence& e) { e.doubted_sensor = HealthReason::range_disagrees; }, degraded(HealthReason::range_disagrees)},
 };
 
 TEST(HealthDecision, WithNothingAgainstItAFrameIsGood) {

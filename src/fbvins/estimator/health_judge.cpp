@@ -90,7 +90,8 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
                .accel_bias_mps2 = state.bias.accel_mps2.norm(),
                .contradiction = evidence.contradiction,
                .hopeless = evidence.hopeless,
-               .wrong_cameras = evidence.wrong_cameras};
+               .wrong_cameras = evidence.wrong_cameras,
+               .doubted_sensor = evidence.doubted_sensor};
   return decide();
 }
 

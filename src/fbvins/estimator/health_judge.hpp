@@ -33,6 +33,7 @@ class HealthJudge {
     bool after_gap = false;          ///< of the readings
     bool after_dark = false;         ///< and the velocity is being found again
     bool clipped = false;
+    HealthReason doubted_sensor = HealthReason::none;  ///< that is left out
     double gyro_vibration_radps = 0;
   };
   /// Health at a frame in the window, after its solve.

@@ -31,10 +31,9 @@ WindowProblem one_camera_window(bool with_readings) {
   std::erase_if(p.landmarks, [](const WindowLandmark& l) { return l.camera != 0; });
   p.observations = kept;
   p.weights.images_show_scale = false;
-  for (WindowFrame& f : p.frames) {
-    f.standstill = false, f.surfaces = nullptr;
-    if (!with_readings) f.imu = nullptr;
-  }
+  test::remove_factors(p, "standstill");
+  test::remove_factors(p, "surfaces");
+  if (!with_readings) test::remove_factors(p, "imu");
   return p;
 }
 
@@ -98,6 +97,7 @@ WindowProblem without_first_frame(const WindowProblem& p, MarginalisationMemory&
     --l.host;
     while (out.observations[l.first_observation].frame < 0) ++l.first_observation, --l.observation_count;
   }
+  std::erase_if(out.factors, [&](const auto& factor) { return factor->touches(p.frames[0].id); });
   out.frames.erase(out.frames.begin());
   for (int& frame : out.prior.frames) {
     WindowFrame& f = out.frames[--frame];

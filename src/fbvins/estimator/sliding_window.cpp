@@ -5,6 +5,8 @@
 #include <cassert>
 #include <utility>
 
+#include "fbvins/estimator/imu_factor.hpp"
+
 namespace fbvins {
 
 namespace {
@@ -27,6 +29,23 @@ void keep_most_observed(std::vector<const Landmark*>& landmarks, int limit) {
   });
 }
 
+/// Those of readings first, then kind by kind.
+void fill_factors(const FrameList& frames, std::vector<std::shared_ptr<const Factor>>& out) {
+  out.clear();
+  for (int i = 1; i < frames.size(); ++i)
+    if (const auto& imu = frames[i].imu; imu && !imu->empty())
+      out.push_back(std::make_shared<const ImuFactor>(frames[i - 1].id, frames[i].id, imu));
+  std::vector<FrameFactor> brought;
+  for (const Frame& f : frames)
+    for (const FrameFactor& factor : f.factors) {
+      const std::vector<Variable> variables = factor.factor->variables();
+      const auto is_here = [&](const Variable& v) { return !v.is_of_frame() || frames.index_of(v.frame) >= 0; };
+      if (std::all_of(variables.begin(), variables.end(), is_here)) brought.push_back(factor);
+    }
+  std::stable_sort(brought.begin(), brought.end(), [](const FrameFactor& a, const FrameFactor& b) { return a.order < b.order; });
+  for (FrameFactor& factor : brought) out.push_back(std::move(factor.factor));
+}
+
 }  // namespace
 
 SlidingWindow::SlidingWindow(const EstimatorOptions& options, const WindowWeights& weights)
@@ -38,6 +57,36 @@ void SlidingWindow::clear() {
   known_.clear();
   prior_ = {};
   tilt_ = {};
+  own_.clear();
+}
+
+int SlidingWindow::add_own(std::string name, const Eigen::VectorXd& value) {
+  own_.push_back({next_own_, std::move(name), value, true});
+  return next_own_++;
+}
+
+const OwnVariable* SlidingWindow::own(int number) const {
+  const auto it = std::find_if(own_.begin(), own_.end(), [&](const OwnVariable& v) { return v.number == number; });
+  return it == own_.end() ? nullptr : &*it;
+}
+
+void SlidingWindow::end_own(int number) {
+  for (OwnVariable& v : own_)
+    if (v.number == number) v.is_wanted = false;
+  forget_unused_own();
+}
+
+void SlidingWindow::forget_unused_own() {
+  std::erase_if(own_, [&](const OwnVariable& v) {
+    const auto names_it = [&](const FrameFactor& f) {
+      const std::vector<Variable> variables = f.factor->variables();
+      return std::find(variables.begin(), variables.end(), Variable::own_one(v.number)) != variables.end();
+    };
+    return !v.is_wanted && std::find(prior_.own.begin(), prior_.own.end(), v.number) == prior_.own.end() &&
+           std::none_of(frames_.begin(), frames_.end(), [&](const Frame& frame) {
+             return std::any_of(frame.factors.begin(), frame.factors.end(), names_it);
+           });
+  });
 }
 
 void SlidingWindow::set_prior(WindowPrior prior) {
@@ -84,11 +133,10 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
 
 void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& out) const {
   out.frames.clear();
-  for (const Frame& f : frames_) {
-    out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior, f.imu, f.standstill, f.surfaces, -1});
-    if (f.surfaces) out.frames.back().surfaces_of = frames_.index_of(f.surfaces->reference);
-    if (out.frames.back().surfaces_of < 0) out.frames.back().surfaces = nullptr;
-  }
+  for (const Frame& f : frames_)
+    out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior});
+  fill_factors(frames_, out.factors);
+  out.own = own_;
   out.tilt = tilt_;
   out.calibration = calibration;
   out.weights = weights_;
@@ -129,6 +177,9 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
 
 void SlidingWindow::take_estimates(const WindowProblem& solved) {
   tilt_ = solved.tilt;
+  for (const OwnVariable& v : solved.own)
+    for (OwnVariable& own : own_)
+      if (own.number == v.number) own.value = v.value;
   for (const WindowFrame& f : solved.frames)
     if (const int i = frames_.index_of(f.id); i >= 0) frames_[i].state = f.state;
   for (int i = 1; i < frames_.size(); ++i) {
@@ -154,8 +205,30 @@ void SlidingWindow::forget_observations(FrameId frame, const Calibration& calibr
 }
 
 void SlidingWindow::forget_frame(int index) {
+  const FrameId id = frames_[index].id;
+  if (index + 1 < frames_.size())  // what it has brought of other frames stays
+    for (FrameFactor& f : frames_[index].factors)
+      if (!f.factor->touches(id)) frames_[index + 1].factors.push_back(std::move(f));
   frames_.remove(index);
+  for (Frame& frame : frames_)
+    std::erase_if(frame.factors, [&](const FrameFactor& f) { return f.factor->touches(id); });  // they are in the prior
   for (int& f : prior_.frames) f -= f > index;
+  forget_unused_own();
+}
+
+/// Of all frames: a factor of another frame may be about this one, too.
+void SlidingWindow::take_over_factors(const Frame& leaving, Frame& next) {
+  const DroppedFrame dropped{leaving.id, next.id, next.state.T_FB.inverse() * leaving.state.T_FB};
+  std::vector<FrameFactor> taken;
+  for (const FrameFactor& f : leaving.factors)
+    if (auto left = f.factor->touches(leaving.id) ? f.factor->without(dropped) : f.factor) taken.push_back({f.order, std::move(left)});
+  next.factors.insert(next.factors.begin(), taken.begin(), taken.end());
+  for (Frame& frame : frames_) {
+    if (frame.id == leaving.id) continue;
+    for (FrameFactor& f : frame.factors)
+      if (f.factor->touches(leaving.id)) f.factor = f.factor->without(dropped);
+    std::erase_if(frame.factors, [](const FrameFactor& f) { return f.factor == nullptr; });
+  }
 }
 
 void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
@@ -175,6 +248,8 @@ void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
     } else {
       next.imu.reset();
     }
+    take_over_factors(leaving, next);
+    leaving.factors.clear();
     forget_observations(leaving.id, calibration);
   }
   forget_frame(index);

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -64,6 +65,13 @@ class SlidingWindow {
   /// A keyframe leaves through marginalisation, with the landmarks it hosts; they are known from now on.
   void marginalise_keyframe(int index, const Calibration& calibration);
 
+  /// A new variable of the factors' own, and its number. It is wanted until told otherwise.
+  int add_own(std::string name, const Eigen::VectorXd& value);
+  const std::vector<OwnVariable>& own() const { return own_; }
+  /// Null where it is gone.
+  const OwnVariable* own(int number) const;
+  void end_own(int number);
+
   /// Landmarks that have left the window.
   KnownLandmarks& known() { return known_; }
   const KnownLandmarks& known() const { return known_; }
@@ -73,7 +81,9 @@ class SlidingWindow {
   void drop_prior(Landmark& landmark);
   void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
   void forget_observations(FrameId frame, const Calibration& calibration);
+  void take_over_factors(const Frame& leaving, Frame& next);
   void forget_frame(int index);
+  void forget_unused_own();
   void remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving, std::span<const Mat3> information);
   void keep_newest_observations(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
                                 const Calibration& calibration);
@@ -91,6 +101,8 @@ class SlidingWindow {
   KnownLandmarks known_;
   WindowPrior prior_;
   Tilt tilt_;
+  std::vector<OwnVariable> own_;
+  int next_own_ = 0;
   Leaving leaving_;
 };
 

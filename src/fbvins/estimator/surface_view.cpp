@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "fbvins/estimator/window_views.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -14,6 +16,8 @@ constexpr std::size_t kFewest = 30;
 constexpr double kFarthest_m = 0.1, kFarthest_sigma = 5;
 /// What a depth sensor's surfaces are bent by, whatever its noise.
 constexpr double kBent_m = 0.005;
+/// With fewer landmarks surfaces are compared as well.
+constexpr std::ptrdiff_t kEnoughLandmarks = 25;
 /// Surfaces seen at a smaller angle have no reliable normal.
 constexpr double kLeastCosine = 0.2;
 
@@ -38,9 +42,9 @@ std::vector<SurfaceFinder::Place> SurfaceFinder::places(const DepthImage& depth,
 }
 
 /// (D1)-(D3): where the reference shows the place, its surface is the plane that its depths lie on.
-SurfaceView SurfaceFinder::distances(const std::vector<Place>& places, const Frame& newest, const Frame& reference,
-                                     const Pose<B, C0>& T_BC) const {
-  SurfaceView out{reference.id, {}};
+std::vector<SurfaceDistance> SurfaceFinder::distances(const std::vector<Place>& places, const Frame& newest,
+                                                      const Frame& reference, const Pose<B, C0>& T_BC) const {
+  std::vector<SurfaceDistance> out;
   const Pose<C0, B> T_CN = T_BC.inverse() * (reference.state.T_FB.inverse() * newest.state.T_FB);
   for (const Place& place : places) {
     const Vec3 p_C = T_CN * place.p_B;
@@ -57,24 +61,32 @@ SurfaceView SurfaceFinder::distances(const std::vector<Place>& places, const Fra
     const double sigma_m = std::hypot(cosine * place.sigma_m, cosine * surface->sigma * depth_m * depth_m, kBent_m);
     const double away_m = normal_C.dot(p_C) - 1 / plane.norm();
     if (cosine < kLeastCosine || std::abs(away_m) > std::max(kFarthest_m, kFarthest_sigma * sigma_m)) continue;
-    out.distances.push_back({place.p_B, T_BC.q * normal_C, T_BC * Vec3(depth_m * m.homogeneous()), 1 / sigma_m});
+    out.push_back({place.p_B, T_BC.q * normal_C, T_BC * Vec3(depth_m * m.homogeneous()), 1 / sigma_m});
   }
   return out;
 }
 
-std::shared_ptr<const SurfaceView> SurfaceFinder::find(const Frame& newest, const FrameList& window,
-                                                       const Calibration& calibration) const {
+std::shared_ptr<const SurfaceFactor> SurfaceFinder::find(const Frame& newest, const FrameList& window,
+                                                         const Calibration& calibration) const {
   if (!reader_ || !reader_->is_usable(newest.depth.get())) return nullptr;
   const std::vector<Place> seen = places(*newest.depth, calibration.T_BC0);
-  SurfaceView best;
+  std::vector<SurfaceDistance> best;
+  FrameId reference;
   for (const Frame& frame : window) {
     if (!frame.keyframe || !reader_->is_usable(frame.depth.get())) continue;
-    SurfaceView view = distances(seen, newest, frame, calibration.T_BC0);
-    if (view.distances.size() > best.distances.size()) best = std::move(view);
-    if (2 * best.distances.size() > seen.size()) break;
+    std::vector<SurfaceDistance> found = distances(seen, newest, frame, calibration.T_BC0);
+    if (found.size() > best.size()) best = std::move(found), reference = frame.id;
+    if (2 * best.size() > seen.size()) break;
   }
-  if (best.distances.size() < kFewest) return nullptr;
-  return std::make_shared<const SurfaceView>(std::move(best));
+  if (best.size() < kFewest) return nullptr;
+  return std::make_shared<const SurfaceFactor>(newest.id, reference, std::move(best));
+}
+
+std::vector<std::shared_ptr<const Factor>> SurfaceMaker::make(const NewFrame& f) {
+  if (f.of_start || std::ssize(landmark_observations(f.window, f.features, f.calibration)) >= kEnoughLandmarks) return {};
+  std::shared_ptr<const SurfaceFactor> found = finder_.find(f.frame, f.window.frames(), f.calibration);
+  if (found == nullptr) return {};
+  return {std::move(found)};
 }
 
 }  // namespace fbvins

@@ -61,9 +61,9 @@ FrameList window_of(bool wall_alone) {
 }
 
 /// Distances in sigmas, if the newest frame lies at `T_rn` from the reference.
-std::vector<double> sigmas(const SurfaceView& view, const Pose<B, B>& T_rn) {
+std::vector<double> sigmas(const SurfaceFactor& view, const Pose<B, B>& T_rn) {
   std::vector<double> out;
-  for (const SurfaceDistance& d : view.distances) out.push_back(d.inverse_sigma_1pm * d.normal_B.dot(T_rn * d.p_B - d.on_it_B));
+  for (const SurfaceDistance& d : view.distances()) out.push_back(d.inverse_sigma_1pm * d.normal_B.dot(T_rn * d.p_B - d.on_it_B));
   return out;
 }
 
@@ -77,8 +77,8 @@ TEST(SurfaceFinder, PlacesLieOnTheSurfacesOfTheReference) {
   for (const bool wall_alone : {false, true}) {
     const auto view = SurfaceFinder(rig()).find(frame_at(2, kThere, wall_alone), window_of(wall_alone), calibration());
     ASSERT_TRUE(view);
-    EXPECT_EQ(view->reference, FrameId{1});
-    EXPECT_GT(view->distances.size(), 60u);
+    EXPECT_EQ(view->reference(), FrameId{1});
+    EXPECT_GT(view->distances().size(), 60u);
     EXPECT_LT(rms(sigmas(*view, kThere.cast_frames<B, B>())), 1);
   }
 }
@@ -105,7 +105,7 @@ TEST(SurfaceFinder, TheEarliestKeyframeThatShowsEnoughIsTheReference) {
   window.add(frame_at(4, kThere, false));
   const auto view = finder.find(frame_at(5, kThere, false), window, calibration());
   ASSERT_TRUE(view);
-  EXPECT_EQ(view->reference, FrameId{3});
+  EXPECT_EQ(view->reference(), FrameId{3});
 }
 
 TEST(SurfaceFinder, WithoutDepthsThereIsNothing) {
@@ -114,7 +114,6 @@ TEST(SurfaceFinder, WithoutDepthsThereIsNothing) {
   EXPECT_FALSE(SurfaceFinder(rig()).find(blind, window_of(false), calibration()));
   EXPECT_FALSE(SurfaceFinder(rig()).find(frame_at(2, kThere, false), FrameList{}, calibration()));
   const StereoRig pair = with_cameras(rig(), {rig().mounted(0), {rig().left, {rig().T_BC0.q, Vec3(0, 0, 0)}}});
-  EXPECT_FALSE(SurfaceFinder(pair).has_sensor());
   EXPECT_FALSE(SurfaceFinder(pair).find(frame_at(2, kThere, false), window_of(false), calibration()));
 }
 

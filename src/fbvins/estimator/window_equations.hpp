@@ -12,27 +12,37 @@
 
 namespace fbvins {
 
-/// Where each variable is in the dense system: 9 of each frame (v, bg, ba), 2 of the tilt and calibration if they are
-/// estimated, 6 of each frame (p, theta). Consecutive poses are adjacent, which makes long runs for the Schur kernel.
+/// Where each variable is in the dense system: 9 of each frame (v, bg, ba), 2 of the tilt if it is estimated, the factors' own,
+/// calibration if it is estimated, 6 of each frame (p, theta). Consecutive poses are adjacent, which makes long runs for the Schur kernel.
 struct WindowLayout {
   int frames = 0;
   int tilt_size = 0;
+  int own_size = 0;
   int calibration_size = 0;
 
   WindowLayout() = default;
   explicit WindowLayout(const WindowProblem& window)
       : frames(window.frame_count()),
         tilt_size(window.weights.estimate_tilt ? kTiltSize : 0),
-        calibration_size(window.calibrating() ? kCalibrationSize : 0) {}
+        own_size(0),
+        calibration_size(window.calibrating() ? kCalibrationSize : 0) {
+    for (const OwnVariable& v : window.own) own_size += static_cast<int>(v.value.size());
+  }
 
-  int size() const { return 15 * frames + tilt_size + calibration_size; }
+  int size() const { return 15 * frames + tilt_size + own_size + calibration_size; }
   int speed_bias_row(int frame) const { return 9 * frame; }
   int tilt_row() const { return 9 * frames; }
-  int calibration_row() const { return tilt_row() + tilt_size; }
+  int own_row() const { return tilt_row() + tilt_size; }
+  int calibration_row() const { return own_row() + own_size; }
   int pose_row(int frame) const { return calibration_row() + calibration_size + 6 * frame; }
   /// Of element k of a frame's 15 numbers (p, theta, v, bg, ba).
   int row_of(int frame, int k) const { return k < 6 ? pose_row(frame) + k : speed_bias_row(frame) + k - 6; }
 };
+
+/// Where the variable begins.
+int row_of(const WindowProblem& window, const WindowLayout& at, const Variable& variable);
+/// Of all variables of the prior, in its order.
+std::vector<int> rows_of(const WindowProblem& window, const WindowLayout& at, const WindowPrior& prior);
 
 /// Relative geometry of every pair of frames.
 class PairTable {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/window_marginalisation.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 
@@ -20,11 +21,10 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
   out.landmarks.clear();
   out.observations.clear();
   out.landmark_priors = problem.landmark_priors;
-  for (int i = 0; i < out.frame_count(); ++i) {
-    if (i != leaving && i != leaving + 1) out.frames[i].imu = nullptr;
-    if (i != leaving) out.frames[i].standstill = false;
-    if (i != leaving && out.frames[i].surfaces_of != leaving) out.frames[i].surfaces = nullptr;
-  }
+  out.own = problem.own;
+  out.factors.clear();
+  for (const std::shared_ptr<const Factor>& factor : problem.factors)
+    if (factor->touches(problem.frames[leaving].id)) out.factors.push_back(factor);
   for (const LeavingLandmark& l : landmarks) {
     WindowLandmark landmark = problem.landmarks[l.index];
     const auto first = problem.observations.begin() + landmark.first_observation;
@@ -39,10 +39,9 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
 std::vector<std::uint8_t> touched_frames(const WindowProblem& problem) {
   std::vector<std::uint8_t> touched(problem.frames.size(), 0);
   for (int frame : problem.prior.frames) touched[frame] = 1;
-  for (std::size_t i = 1; i < problem.frames.size(); ++i)
-    if (problem.frames[i].imu != nullptr) touched[i - 1] = touched[i] = 1;
-  for (std::size_t i = 0; i < problem.frames.size(); ++i)
-    if (problem.frames[i].surfaces != nullptr) touched[i] = touched[problem.frames[i].surfaces_of] = 1;
+  for (const std::shared_ptr<const Factor>& factor : problem.factors)
+    for (const Variable& v : factor->variables())
+      if (v.is_of_frame()) touched[problem.index_of(v.frame)] = 1;
   for (const WindowLandmark& l : problem.landmarks) {
     touched[l.host] = 1;
     for (int k = 0; k < l.observation_count; ++k) touched[problem.observations[l.first_observation + k].frame] = 1;
@@ -50,19 +49,36 @@ std::vector<std::uint8_t> touched_frames(const WindowProblem& problem) {
   return touched;
 }
 
-/// From the present estimate, at which the new prior's gradient was taken, to the prior's origin (-e of W12).
-Eigen::VectorXd displacement_to_origin(const WindowProblem& problem, const WindowPrior& prior) {
-  Eigen::VectorXd back = Eigen::VectorXd::Zero(prior.quadratic.size());
-  if (prior.with_tilt) back.head<kTiltSize>() = -problem.tilt.angle_rad;
-  if (problem.prior.with_calibration)
-    back.segment<kCalibrationSize>(prior.calibration_row()) = -calibration_displacement(problem.calibration, prior.calibration);
-  int at = prior.frames_row();
-  for (int frame : prior.frames) {
-    if (problem.frames[frame].in_prior)
-      back.segment<15>(at) = -problem.frames[frame].state.boxminus(problem.frames[frame].first_estimate);
-    at += 15;
+/// Numbers of the own variables that the prior and the factors of the problem name.
+std::vector<int> named_own(const WindowProblem& problem) {
+  std::vector<int> out = problem.prior.own;
+  for (const std::shared_ptr<const Factor>& factor : problem.factors)
+    for (const Variable& v : factor->variables())
+      if (v.kind == Variable::Kind::own) out.push_back(v.own);
+  return out;
+}
+
+/// Own variables of the new prior, and of those that leave with the frame the rows: nothing else names them, or wants them later.
+std::vector<int> divide_own(const WindowProblem& problem, const WindowProblem& factors, FrameId leaving, const WindowLayout& at,
+                            WindowPrior& prior) {
+  WindowProblem rest;
+  for (const std::shared_ptr<const Factor>& factor : problem.factors)
+    if (!factor->touches(leaving)) rest.factors.push_back(factor);
+  const auto contains = [](const std::vector<int>& all, int n) { return std::find(all.begin(), all.end(), n) != all.end(); };
+  const std::vector<int> named = named_own(factors), needed = named_own(rest);
+  std::vector<int> leaving_rows;
+  for (const OwnVariable& v : problem.own) {
+    if (!contains(named, v.number)) continue;
+    const int size = static_cast<int>(v.value.size());
+    if (v.is_wanted || contains(needed, v.number)) {
+      prior.own.push_back(v.number);
+      prior.own_size += size;
+    } else {
+      const int row = row_of(factors, at, Variable::own_one(v.number));
+      for (int k = 0; k < size; ++k) leaving_rows.push_back(row + k);
+    }
   }
-  return back;
+  return leaving_rows;
 }
 
 }  // namespace
@@ -101,20 +117,16 @@ Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::s
   prior.with_tilt = problem.weights.estimate_tilt;
   prior.with_calibration = problem.calibrating();
   prior.calibration = problem.prior.with_calibration ? problem.prior.calibration : problem.calibration;
-  std::vector<int> keep, drop;
-  for (int k = 0; k < at.tilt_size; ++k) keep.push_back(at.tilt_row() + k);
-  if (prior.with_calibration)
-    for (int k = 0; k < kCalibrationSize; ++k) keep.push_back(at.calibration_row() + k);
+  std::vector<int> drop = divide_own(problem, factors, problem.frames[leaving].id, at, prior);
   const std::vector<std::uint8_t> touched = touched_frames(factors);
-  for (int i = 0; i < problem.frame_count(); ++i) {
-    if (i != leaving && !touched[i]) continue;
-    if (i != leaving) prior.frames.push_back(i);
-    for (int k = 0; k < 15; ++k) (i == leaving ? drop : keep).push_back(at.row_of(i, k));
-  }
+  for (int i = 0; i < problem.frame_count(); ++i)
+    if (i != leaving && touched[i]) prior.frames.push_back(i);
+  const std::vector<int> keep = rows_of(factors, at, prior);
+  for (int k = 0; k < 15; ++k) drop.push_back(at.row_of(leaving, k));
   prior.quadratic = marginalise(information.H, information.g, keep, drop);
   // The gradient was taken at the present estimate; the prior's origin is the first estimates (W12).
   // Computed before the prior is moved from: the order in which arguments are evaluated is unspecified.
-  const Eigen::VectorXd back = displacement_to_origin(problem, prior);
+  const Eigen::VectorXd back = -problem.displacement(prior);
   prior.quadratic = shifted(std::move(prior.quadratic), back);
   return out;
 }

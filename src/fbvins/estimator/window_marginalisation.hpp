@@ -33,8 +33,8 @@ struct MarginalisationMemory {
   NormalEquations equations;
 };
 
-/// The prior on the other frames after `leaving` and the landmarks are eliminated from the old prior, the standstill, IMU
-/// and surface factors of the frame, and those landmarks' observations. Frames named in it are linearised at
+/// The prior on the other frames after `leaving` and the landmarks are eliminated from the old prior, the factors
+/// of the frame, and those landmarks' observations. Frames named in it are linearised at
 /// linearisation_point(): first estimates where they have one, else their state.
 Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::span<const LeavingLandmark> landmarks,
                                MarginalisationMemory& memory);

@@ -43,7 +43,7 @@ Scene make_scene(bool with_prior) {
   }
   p.observations = kept;
   if (!with_prior) p.prior = {};
-  for (WindowFrame& f : p.frames) f.standstill = false;
+  test::remove_factors(p, "standstill");
   for (WindowLandmark& l : p.landmarks) l.prior = -1;  // a known position is not invariant to moves of the world
   return s;
 }
@@ -55,9 +55,8 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<Leav
   out.weights = p.weights;
   out.tilt = p.tilt;
   out.frames.assign(p.frames.begin() + 1, p.frames.end());
-  out.frames[0].imu = nullptr;  // its factor is in the prior
-  for (WindowFrame& f : out.frames)
-    if (--f.surfaces_of < 0) f.surfaces = nullptr;  // the same
+  out.factors = p.factors;
+  std::erase_if(out.factors, [&](const auto& factor) { return factor->touches(p.frames[0].id); });  // they are in the prior
   for (int& frame : prior.frames) {
     WindowFrame& f = out.frames[--frame];
     if (!f.in_prior) f.first_estimate = f.state;

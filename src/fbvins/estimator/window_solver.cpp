@@ -33,6 +33,7 @@ struct Estimate {
   std::vector<Vec3> landmarks;
   Calibration calibration;
   Tilt tilt;
+  std::vector<OwnVariable> own;
 
   void save(const WindowProblem& window) {
     states.resize(window.frames.size());
@@ -41,12 +42,14 @@ struct Estimate {
     for (std::size_t i = 0; i < landmarks.size(); ++i) landmarks[i] = window.landmarks[i].alpha_beta_rho;
     calibration = window.calibration;
     tilt = window.tilt;
+    own = window.own;
   }
   void restore(WindowProblem& window) const {
     for (std::size_t i = 0; i < states.size(); ++i) window.frames[i].state = states[i];
     for (std::size_t i = 0; i < landmarks.size(); ++i) window.landmarks[i].alpha_beta_rho = landmarks[i];
     window.calibration = calibration;
     window.tilt = tilt;
+    window.own = own;
   }
 };
 
@@ -64,12 +67,12 @@ void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step,
     l.z() = (l.z() + step.landmarks[i].z() + scale * l.z()) / (1 + scale);
     l.z() = std::max(l.z(), window.weights.min_inverse_depth_1pm);
   }
-  if (at.calibration_size > 0) {
-    const auto c = d.segment<kCalibrationSize>(at.calibration_row());
-    window.calibration.T_BC0 = window.calibration.T_BC0.boxplus(c.segment<3>(0), c.segment<3>(3));
-    window.calibration.T_BC1 = window.calibration.T_BC1.boxplus(c.segment<3>(6), c.segment<3>(9));
-    window.calibration.time_offset_s += c(kTimeOffsetIndex);
-    window.calibration.line_delay_s += c(kLineDelayIndex);
+  if (at.calibration_size > 0)
+    window.move({Variable::Kind::calibration}, d.segment<kCalibrationSize>(at.calibration_row()));
+  int row = at.own_row();
+  for (OwnVariable& own : window.own) {
+    own.value += d.segment(row, own.value.size());
+    row += static_cast<int>(own.value.size());
   }
 }
 

@@ -3,9 +3,13 @@
 #pragma once
 
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/estimator/imu_factor.hpp"
+#include "fbvins/estimator/standstill_factor.hpp"
+#include "fbvins/estimator/surface_factor.hpp"
 #include "fbvins/estimator/window_problem.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
 
@@ -21,6 +25,18 @@ struct Window {
   Eigen::Matrix<double, kCalibrationSize, 1> calibration_weight;
 };
 
+inline void remove_factors(WindowProblem& p, std::string_view kind) {
+  std::erase_if(p.factors, [&](const auto& factor) { return factor->name() == kind; });
+}
+/// Of a window problem, those of a kind.
+template <class Kind>
+std::vector<const Kind*> factors_of(const WindowProblem& p) {
+  std::vector<const Kind*> out;
+  for (const auto& factor : p.factors)
+    if (const auto* one = dynamic_cast<const Kind*>(factor.get())) out.push_back(one);
+  return out;
+}
+
 inline Vec3 noise3(Rng& rng, double sigma) { return sigma * normal3(rng); }
 
 inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
@@ -35,7 +51,8 @@ inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
       add_noise(segment, {}, rng);
       Preintegration imu(ImuNoise{}, ImuBias{});
       imu.integrate(segment);
-      frame.imu = std::make_shared<const Preintegration>(std::move(imu));
+      w.problem.factors.push_back(std::make_shared<const ImuFactor>(FrameId{k - 1}, frame.id,
+                                                                    std::make_shared<const Preintegration>(std::move(imu))));
     }
     w.problem.frames.push_back(frame);
   }
@@ -77,15 +94,15 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
 /// Places that a frame sees on surfaces of an earlier one, some sigmas off.
 inline void add_surfaces(Window& w, int frame, int reference) {
   Rng rng(19);
-  auto view = std::make_shared<SurfaceView>();
+  std::vector<SurfaceDistance> distances;
   const Pose<B, B> T_rf = w.problem.frames[reference].state.T_FB.inverse() * w.problem.frames[frame].state.T_FB;
   for (int k = 0; k < 25; ++k) {
     const Vec3 p_B = noise3(rng, 2);
     const Vec3 normal_B = noise3(rng, 1).normalized();
-    view->distances.push_back({p_B, normal_B, T_rf * p_B + noise3(rng, 0.02), 80});
+    distances.push_back({p_B, normal_B, T_rf * p_B + noise3(rng, 0.02), 80});
   }
-  w.problem.frames[frame].surfaces = view;
-  w.problem.frames[frame].surfaces_of = reference;
+  w.problem.factors.push_back(
+      std::make_shared<const SurfaceFactor>(w.problem.frames[frame].id, w.problem.frames[reference].id, std::move(distances)));
 }
 
 inline Window make_window(bool calibrating) {
@@ -118,10 +135,9 @@ inline Window make_window(bool calibrating) {
     if (&f != &w.problem.frames[0]) f.state = f.state.boxplus(d);
     f.first_estimate = f.state;
   }
+  w.problem.factors.push_back(std::make_shared<const StandstillFactor>(FrameId{3}, 0.5));  // not true, to test the term
   add_surfaces(w, 5, 0);
   w.problem.tilt.angle_rad = Vec2(0.03, -0.02);
-  w.problem.frames[3].standstill = true;  // not true, to test the term
-  w.problem.weights.standstill_velocity_sigma_mps = 0.5;
 
   w.tilt_weight << 20, 30;
   w.frame_weight << Vec3::Constant(1e4), Vec3::Constant(1e4), Vec3::Constant(1e2), Vec3::Constant(1e2), Vec3::Constant(10);
@@ -133,6 +149,7 @@ inline Window make_window(bool calibrating) {
   w.problem.prior.quadratic.H = weight.cwiseAbs2().asDiagonal();
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(weight.size());
   w.problem.prior.frames = {0};
+  w.problem.frames[0].in_prior = true;
   w.problem.prior.with_tilt = true;
   w.problem.prior.with_calibration = calibrating;
   w.problem.prior.calibration = w.problem.calibration;

@@ -41,23 +41,23 @@ class CeresTwin {
     problem_.AddParameterBlock(calibration_.data(), 14);
     if (!calibrating_) problem_.SetParameterBlockConstant(calibration_.data());
     for (std::size_t k = 0; k < p.landmarks.size(); ++k) add_landmark(p, k);
-    for (int j = 1; j < kFrames; ++j) {
+    for (const ImuFactor* factor : test::factors_of<ImuFactor>(p)) {
+      const int j = p.index_of(factor->to());
       auto imu = std::make_unique<Imu>();
       imu->from = p.frames[j - 1].state, imu->to = p.frames[j].state;
-      imu->between = p.frames[j].imu, imu->gravity = p.weights.gravity_mps2;
+      imu->between = factor->readings(), imu->gravity = p.weights.gravity_mps2;
       add(std::move(imu), 15, {frame(j - 1), frame(j), tilt_block()});
     }
     add_diagonal(w.tilt_weight, tilt_block());
     add_diagonal(w.frame_weight, frame(0));
     if (calibrating_) add_diagonal(w.calibration_weight.head<14>(), calibration_block());
-    for (int k = 0; k < kFrames; ++k) {
-      if (!p.frames[k].standstill) continue;
+    for (const StandstillFactor* factor : test::factors_of<StandstillFactor>(p)) {
+      const int k = p.index_of(factor->frame());
       auto standstill = std::make_unique<Standstill>();
-      standstill->state = p.frames[k].state, standstill->weight = 1 / p.weights.standstill_velocity_sigma_mps;
+      standstill->state = p.frames[k].state, standstill->weight = 1 / factor->sigma_mps();
       add(std::move(standstill), 3, {frame(k)});
     }
-    for (int k = 0; k < kFrames; ++k)
-      if (p.frames[k].surfaces) add_surfaces(p, k);
+    for (const SurfaceFactor* factor : test::factors_of<SurfaceFactor>(p)) add_surfaces(p, *factor);
   }
 
   /// Cost, and residuals with Jacobian (robust weights applied); columns: landmarks, frames, tilt, calibration.
@@ -116,12 +116,12 @@ class CeresTwin {
     diagonal->weight = weight;
     add(std::move(diagonal), block.size, {block});
   }
-  void add_surfaces(const WindowProblem& p, int k) {
-    const WindowFrame& f = p.frames[k];
-    for (const SurfaceDistance& distance : f.surfaces->distances) {
+  void add_surfaces(const WindowProblem& p, const SurfaceFactor& factor) {
+    const int k = p.index_of(factor.frame()), of = p.index_of(factor.reference());
+    for (const SurfaceDistance& distance : factor.distances()) {
       auto surface = std::make_unique<Surface>();
-      surface->frame = f.state, surface->reference = p.frames[f.surfaces_of].state, surface->distance = distance;
-      add(std::move(surface), 1, {frame(k), frame(f.surfaces_of)}, new ceres::HuberLoss(p.weights.huber_sigma));
+      surface->frame = p.frames[k].state, surface->reference = p.frames[of].state, surface->distance = distance;
+      add(std::move(surface), 1, {frame(k), frame(of)}, new ceres::HuberLoss(p.weights.huber_sigma));
     }
   }
   void add_landmark(const WindowProblem& p, std::size_t index) {
@@ -258,7 +258,10 @@ Window window_at_rest(std::uint64_t seed) {
   w.problem.weights.estimate_tilt = false;
   w.problem.calibration.T_BC1.p = Vec3(0.11, 0, 0);
   w.problem.frames.resize(kFrames);
-  for (WindowFrame& f : w.problem.frames) f.standstill = true;
+  for (int k = 0; k < kFrames; ++k) {
+    w.problem.frames[k].id = FrameId{k};
+    w.problem.factors.push_back(std::make_shared<const StandstillFactor>(FrameId{k}));
+  }
   for (int k = 0; k < 20; ++k) {
     const double x = rng.uniform(-2, 2), y = rng.uniform(-1, 1);
     test::add_landmark(w, Vec3(x, y, rng.uniform(3, 6)), 0, rng);
@@ -272,6 +275,7 @@ Window window_at_rest(std::uint64_t seed) {
   w.problem.prior.quadratic.H = Eigen::MatrixXd::Identity(15, 15) * 1e6;
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(15);
   w.problem.prior.frames = {0};
+  w.problem.frames[0].in_prior = true;
   return w;
 }
 

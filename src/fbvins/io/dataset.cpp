@@ -86,6 +86,7 @@ std::optional<SensorEvent> Dataset::next() {
       at_end_ = true;
       return std::nullopt;
     }
+    if (const auto reading = due_range()) return *reading;
     auto frame = next_frame();
     if (!frame) continue;
     const std::vector<Time>& steps = contents_.info.clock_steps;
@@ -103,6 +104,16 @@ bool Dataset::imu_is_due() const {
   if (frame.imu_before) return next_imu_ < *frame.imu_before;
   const Time image = frame.t + Duration::from_seconds(contents_.rig.time_offset_s);
   return next_imu_ == 0 || contents_.imu[next_imu_ - 1].t < image;
+}
+
+/// On the images' clock.
+std::optional<RangeSample> Dataset::due_range() {
+  if (next_range_ == contents_.ranges.size()) return std::nullopt;
+  RangeSample reading = contents_.ranges[next_range_];
+  reading.t = reading.t - Duration::from_seconds(contents_.rig.time_offset_s);
+  if (reading.t > contents_.frames[next_frame_].t) return std::nullopt;
+  ++next_range_;
+  return reading;
 }
 
 /// Nullopt for a frame that lost all of its images, unless it was recorded without any.

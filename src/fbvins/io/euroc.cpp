@@ -19,6 +19,7 @@
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/numbers.hpp"
+#include "fbvins/io/range_folder.hpp"
 #include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
@@ -63,7 +64,7 @@ class EurocReader {
     out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
     find_cameras();
     for (auto step : {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_rows,
-                      &EurocReader::read_frames, &EurocReader::read_imu})
+                      &EurocReader::read_frames, &EurocReader::read_imu, &EurocReader::read_ranges})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
@@ -286,6 +287,23 @@ class EurocReader {
                                format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t), format_seconds(first),
                                format_seconds(last))};
     if (begins_later(options_)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
+    return {};
+  }
+
+  Result<void> read_ranges() {
+    const std::string folder = kRangeFolder;
+    if (!exists(folder + "data.csv")) return {};
+    if (!rows_.clock.begins.empty())
+      return warn(fmt::format("{}: not used: the clock of the recording steps back", named(folder + "data.csv"))), Result<void>{};
+    Result<std::string> csv = text(folder + "data.csv", kLargestBeside_bytes);
+    if (!csv) return csv.error();
+    Result<std::vector<RangeSample>> ranges = parse_yaml(folder + "sensor.yaml", [&](YamlReader yaml) {
+      return parse_ranges(std::move(yaml), *csv, named(folder + "data.csv"), T_BI_, out_.info.warnings);
+    });
+    if (!ranges) return ranges.error();
+    out_.ranges = *std::move(ranges);
+    const Time first = out_.frames.front().t + Duration::from_seconds(out_.rig.time_offset_s);
+    if (begins_later(options_)) std::erase_if(out_.ranges, [&](const RangeSample& r) { return r.t < first - kImuLeadIn; });
     return {};
   }
 

@@ -17,6 +17,7 @@
 #include "fbvins/io/imu_file.hpp"
 #include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
+#include "fbvins/io/range_folder.hpp"
 
 namespace fbvins {
 namespace {
@@ -162,6 +163,7 @@ Result<void> write_images(const Images& images, const fs::path& mav0) {
 
 struct EurocFolder::State {
   fs::path mav0;
+  std::string origin;
   std::vector<std::string> rows;  ///< of each camera
   std::optional<std::string> depth_rows;
   std::future<Result<void>> writing;
@@ -175,6 +177,7 @@ Result<EurocFolder> EurocFolder::create(const std::string& folder, const StereoR
   if (Result<void> done = write_calibrations(rig, mav0, origin, depth); !done) return done.error();
   auto state = std::make_unique<State>();
   state->mav0 = mav0;
+  state->origin = origin;
   state->rows.assign(static_cast<std::size_t>(rig.camera_count()), kRowsHeader);
   if (rig.depth) state->depth_rows = kRowsHeader;
   return EurocFolder(std::move(state));
@@ -196,6 +199,16 @@ Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<f
   state_->writing = std::async(std::launch::async, [images = Images{std::move(frame), right_stamp, std::move(depth_left_m)},
                                                     mav0 = state_->mav0] { return write_images(images, mav0); });
   return {};
+}
+
+Result<void> EurocFolder::add_ranges(const std::vector<RangeSample>& readings) {
+  if (readings.empty()) return {};
+  const fs::path folder = state_->mav0 / kRangeFolder;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return cannot_write(folder);
+  if (Result<void> done = write_file(folder / "sensor.yaml", range_yaml(readings.front(), state_->origin)); !done) return done;
+  return write_file(folder / "data.csv", range_csv(readings));
 }
 
 Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth) {

@@ -153,6 +153,16 @@ void Ingest::push_anchor(Anchor anchor) {
   anchors_.push_back(std::move(anchor));
 }
 
+void Ingest::push_range(const RangeSample& reading) {
+  const std::lock_guard order(order_mutex_);
+  RangeSample corrected = reading;
+  corrected.t = clock_.corrected(ClockGuard::camera, reading.t);
+  const std::lock_guard lock(mutex_);
+  if (closed_ || !impossible(reading).empty()) return;
+  queue_.push_back(corrected);
+  filled_.notify_one();
+}
+
 std::vector<Anchor> Ingest::take_anchors() {
   const std::lock_guard lock(mutex_);
   return std::exchange(anchors_, {});

@@ -40,6 +40,7 @@ class Ingest final : public SensorInput {
   void push(StereoFrame frame) override;
   /// Its stamp is corrected as those of the images are.
   void push_anchor(Anchor anchor) override;
+  void push_range(const RangeSample& reading) override;
   /// Releases readings that have waited long enough (ImuOrder); to be called every few milliseconds.
   void tick();
 

@@ -70,7 +70,7 @@ bool ReplaySource::play(SensorInput& input, Duration later, const std::function<
     }
     if (!wait_until(start_ns_ + Duration::from_seconds((t - *first_).seconds() / speed_).ns)) return false;
     newest_ = t;
-    std::visit([&](auto& e) { input.push(std::move(e)); }, *event);
+    push_event(input, *std::move(event));
   }
   return true;
 }

@@ -9,6 +9,9 @@ namespace {
 /// Readings that a correction of the time offset may need again.
 constexpr Duration kMostCorrection{100'000'000};
 
+/// An older one has come late, or images were missing: the motion since is too long.
+constexpr Duration kOldestRange{150'000'000};
+
 }  // namespace
 
 void PacketMaker::push(StereoFrame frame) {
@@ -24,6 +27,12 @@ void PacketMaker::push(Anchor anchor) {
   constexpr std::size_t kMost = 1024;  // where no images come
   if (anchors_.size() >= kMost) anchors_.erase(anchors_.begin());
   anchors_.push_back(std::move(anchor));
+}
+
+void PacketMaker::push(const RangeSample& reading) {
+  constexpr std::size_t kMost = 1024;  // where no images come
+  if (ranges_.size() >= kMost) ranges_.pop_front();
+  ranges_.push_back(reading);
 }
 
 bool PacketMaker::is_ready(bool flush) const {
@@ -51,6 +60,11 @@ std::optional<SensorPacket> PacketMaker::next(bool flush) {
   packet.id = FrameId{next_frame_++};
   packet.frame = std::move(waiting_.front());
   packet.anchors = std::exchange(anchors_, {});
+  std::erase_if(ranges_, [&](const RangeSample& reading) {
+    if (reading.t > t) return false;
+    if (t - reading.t < kOldestRange) packet.ranges.push_back(reading);
+    return true;
+  });
   waiting_.pop_front();
   packet.imu.time_offset = time_offset_;
   if (previous_) packet.imu = imu_.between(*previous_, t);

@@ -87,6 +87,30 @@ TEST(PacketMaker, FlushGivesImagesThatStillWaitForReadings) {
   EXPECT_TRUE(drain(maker, true).empty());
 }
 
+TEST(PacketMaker, ARangeGoesWithTheFirstImageThatIsNotOlder) {
+  PacketMaker maker = make();
+  for (int ms = 0; ms <= 300; ms += 5) maker.push(reading(ms));
+  const auto range = [&](std::int64_t ms) {
+    RangeSample r;
+    r.t = Time{ms * kMs};
+    maker.push(r);
+  };
+  for (const int ms : {40, 50, 60, 1'000'000, 90}) range(ms);  // one of them from the far future
+  for (const int ms : {0, 50, 100}) maker.push(image(ms));
+  const auto packets = drain(maker);
+  ASSERT_EQ(packets.size(), 3u);
+  EXPECT_TRUE(packets[0].ranges.empty());
+  ASSERT_EQ(packets[1].ranges.size(), 2u);
+  EXPECT_EQ(packets[1].ranges[1].t.ns, 50 * kMs);
+  ASSERT_EQ(packets[2].ranges.size(), 2u);
+  range(80), range(99);  // late, but not too late
+  maker.push(image(240));
+  const auto later = drain(maker);
+  ASSERT_EQ(later.size(), 1u);
+  ASSERT_EQ(later[0].ranges.size(), 1u) << "the other one is too old";
+  EXPECT_EQ(later[0].ranges[0].t.ns, 99 * kMs);
+}
+
 TEST(PacketMaker, TheTimeOffsetMovesTheReadingsAndNotTheImage) {
   PacketMaker maker = make(0.010);
   for (int ms = 0; ms <= 100; ms += 5) {

@@ -11,6 +11,7 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_faces.hpp"
 #include "fbvins/core/bounded_queue.hpp"
+#include "fbvins/core/overloaded.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/pipeline/feedback.hpp"
 #include "fbvins/pipeline/keyframe_anchors.hpp"
@@ -116,6 +117,7 @@ struct System::Impl {
     frame.offsets = packet.frame.offsets;
     frame.after_clock_step = packet.frame.after_clock_step;
     frame.anchors = std::move(packet.anchors);
+    frame.ranges = std::move(packet.ranges);
     if (keyframes_wanted()) frame.images = std::move(images);
     hand_on(estimation, std::move(frame));
   }
@@ -168,6 +170,12 @@ struct System::Impl {
   void push(StereoFrame frame) {
     frame.offsets += own_offsets;
     packet_maker.push(std::move(frame));
+  }
+
+  Result<void> push(const RangeSample& reading) {
+    if (const std::string why = impossible(reading); !why.empty()) return Error{ErrorCode::invalid_argument, why};
+    packet_maker.push(reading);
+    return {};
   }
 
   /// Sends on the packets that are ready; with `flush`, all that wait.
@@ -266,8 +274,11 @@ void System::on_map_update(std::function<void(const MapUpdate&)> callback) { imp
 Result<void> System::push(SensorEvent event) {
   if (impl_->finished && impl_->status.get())
     return Error{ErrorCode::invalid_argument, "push() after finish(): the system has ended"};
-  if (auto* sample = std::get_if<ImuSample>(&event)) impl_->packet_maker.push(*sample);
-  else impl_->push(std::get<StereoFrame>(std::move(event)));
+  const Result<void> taken = std::visit(Overloaded{[this](ImuSample& sample) { return impl_->packet_maker.push(sample), Result<void>{}; },
+                                                   [this](StereoFrame& frame) { return impl_->push(std::move(frame)), Result<void>{}; },
+                                                   [this](const RangeSample& reading) { return impl_->push(reading); }},
+                                        event);
+  if (!taken) return taken;
   impl_->forward(false);
   return impl_->status.get();
 }

@@ -33,6 +33,7 @@ std::string_view to_string(HealthReason reason) {
     case HealthReason::imu_clipped: return "imu_clipped";
     case HealthReason::imu_vibration: return "imu_vibration";
     case HealthReason::correction_pending: return "correction_pending";
+    case HealthReason::range_disagrees: return "range_disagrees";
   }
   return "unknown";
 }

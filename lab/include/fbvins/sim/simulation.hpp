@@ -20,6 +20,7 @@
 #include "fbvins/sim/image_sensor.hpp"
 #include "fbvins/sim/imu_model.hpp"
 #include "fbvins/sim/lighting.hpp"
+#include "fbvins/sim/range_model.hpp"
 #include "fbvins/sim/world.hpp"
 
 namespace fbvins {
@@ -79,6 +80,7 @@ struct SimulationOptions {
   CameraModelOptions camera;
   CalibrationErrorOptions calibration_error;
   DepthModelOptions depth;
+  RangeModelOptions range;
   WorldOptions world;
   LightOptions light;
 
@@ -98,6 +100,7 @@ struct SimulationOptions {
     v.group("camera", camera, "both cameras");
     v.group("calibration_error", calibration_error, "the calibration that the recording is written with, against the true one");
     v.group("depth", depth, "the depth sensor of the rig rgbd");
+    v.group("range", range, "a rangefinder that looks down");
     v.group("world", world, "the place");
     v.group("light", light, "the lamps");
   }
@@ -136,6 +139,7 @@ struct Simulation {
   SplineTrajectory flight;
   Time start;
   SimulatedImu imu;
+  std::vector<RangeSample> ranges = {};
   std::vector<Time> frames;               ///< stamps of the images, on the IMU's clock
   Vec3 world_from_flight = Vec3::Zero();  ///< added to the flight's positions: a recorded one has its origin anywhere
   std::shared_ptr<const World> world;
