@@ -7,7 +7,9 @@
 
 #include <memory>
 
+#include "fbvins/estimator/surface_factor.hpp"
 #include "fbvins/estimator/window_problem.hpp"
+#include "fbvins/imu/preintegration.hpp"
 
 namespace fbvins::test {
 
