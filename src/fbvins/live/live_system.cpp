@@ -84,11 +84,15 @@ struct LiveSystem::Impl {
 
   void feed() {
     while (std::optional<SensorEvent> event = ingest.pop()) {
-      std::visit([this](const auto& e) { hub.publish(e); }, *event);
+      std::visit([this](const auto& e) { tell_sinks(e); }, *event);
       for (Anchor& anchor : ingest.take_anchors()) (void)system.push(std::move(anchor));  // impossible ones are left out
       if (Result<void> taken = system.push(std::move(*event)); !taken) return;            // the watcher reports it
     }
   }
+
+  void tell_sinks(const ImuSample& sample) { hub.publish(sample); }
+  void tell_sinks(const StereoFrame& frame) { hub.publish(frame); }
+  void tell_sinks(const RangeSample&) {}  // no sink has a use for it
 
   void watch_sensors() {
     Time told = host_now();
