@@ -68,6 +68,12 @@ bool same_image(const std::shared_ptr<const Image>& a, const std::shared_ptr<con
          std::equal(a->row(0), a->row(0) + static_cast<std::ptrdiff_t>(a->width()) * a->height(), b->row(0));
 }
 
+/// A record has images and the IMU's readings.
+void add_to(FlightRecord& record, const SensorEvent& event) {
+  if (const auto* sample = std::get_if<ImuSample>(&event)) EXPECT_TRUE(record.add(*sample));
+  else EXPECT_TRUE(record.add(std::get<StereoFrame>(event)));
+}
+
 bool same_event(const SensorEvent& a, const SensorEvent& b) {
   if (a.index() != b.index()) return false;
   if (const auto* s = std::get_if<ImuSample>(&a)) {
@@ -107,7 +113,7 @@ class FlightRecordTest : public ::testing::Test {
   }
   void write(const std::vector<SensorEvent>& events, bool images = true) {
     FlightRecord record = create(images);
-    for (const SensorEvent& event : events) std::visit([&](const auto& e) { EXPECT_TRUE(record.add(e)); }, event);
+    for (const SensorEvent& event : events) add_to(record, event);
     EXPECT_TRUE(record.finish());
   }
   void expect_refused(const std::string& sentence, const DatasetOptions& options = {}) {
@@ -259,7 +265,7 @@ TEST_F(FlightRecordTest, PosesAndHealthChangeNothing) {
   update.localised = true;
   const std::vector<SensorEvent> events = eventful_flight();
   for (const SensorEvent& event : events) {
-    std::visit([&](const auto& e) { EXPECT_TRUE(record.add(e)); }, event);
+    add_to(record, event);
     EXPECT_TRUE(record.add(odometry));
     EXPECT_TRUE(record.add_live({odometry.t, odometry.T_WB}));
     EXPECT_TRUE(record.add(update));
@@ -329,7 +335,7 @@ TEST_F(FlightRecordTest, ACamchainReplacesTheCamerasAndNotTheNoise) {
   const KalibrFiles files(kalibr);
   auto record = FlightRecord::create(path_, own, {.program = "a test", .images = true});
   ASSERT_TRUE(record);
-  for (const SensorEvent& event : eventful_flight()) std::visit([&](const auto& e) { EXPECT_TRUE(record->add(e)); }, event);
+  for (const SensorEvent& event : eventful_flight()) add_to(*record, event);
   ASSERT_TRUE(record->finish());
   const auto cameras = open_dataset(path_, {.kalibr_camchain = files.camchain()});
   ASSERT_TRUE(cameras) << cameras.error().message;
