@@ -15,7 +15,8 @@ FOLDERS = ("include", "src", "lab/include", "lab")
 NAMED = re.compile(r"(?<![\w:])((?:std|fmt|Eigen)::)?(?:[A-Za-z_]\w*::)*([A-Za-z_]\w*)(?=[({<])|(?:\.|->)([A-Za-z_]\w*)")
 KEYWORDS = {"if", "for", "while", "switch", "return", "sizeof", "else", "const", "auto", "double", "int", "static_cast", "catch"}
 # What an example's reader is to put in, and members of the standard library.
-OPEN = {"use", "print", "offer", "plot", "for_rig", "fly_with", "chosen_by", "slow_down", "drop_all_tracks", "wait_for_more_motion", "ASSERT_TRUE"}
+OPEN = {"use", "print", "offer", "plot", "for_rig", "fly_with", "chosen_by", "slow_down", "drop_all_tracks", "wait_for_more_motion", "ASSERT_TRUE", "EXPECT_TRUE", "EXPECT_LT",
+        "MyFactor"}
 STANDARD = {"begin", "end", "size", "empty", "front", "back", "get", "reset", "value", "value_or", "has_value", "data", "push_back",
             "first", "second", "find", "c_str", "str", "norm", "transpose", "inverse", "x", "y", "z", "w", "resize", "at", "count",
             "load", "store", "join", "wait", "lock", "what", "png"}

@@ -56,8 +56,11 @@ TEST(RangeFolder, WrongFilesAreNamed) {
   const auto without_place = parsed("noise_m: 0.01\n", range_csv({beam()}), warnings);
   ASSERT_FALSE(without_place);
   EXPECT_NE(without_place.error().message.find("T_BS"), std::string::npos) << without_place.error().message;
-  const auto no_noise = parsed(range_yaml(beam(), "a") + "noise_m: -1\n", range_csv({beam()}), warnings);
-  EXPECT_FALSE(no_noise);
+  std::string negative = range_yaml(beam(), "a");
+  negative.insert(negative.find("noise_m: ") + 9, "-");
+  const auto no_noise = parsed(negative, range_csv({beam()}), warnings);
+  ASSERT_FALSE(no_noise);
+  EXPECT_NE(no_noise.error().message.find("noise_m"), std::string::npos) << no_noise.error().message;
   const auto three_columns = parsed(range_yaml(beam(), "a"), "1,2,3\n", warnings);
   ASSERT_FALSE(three_columns);
   EXPECT_NE(three_columns.error().message.find("data.csv:1"), std::string::npos) << three_columns.error().message;
