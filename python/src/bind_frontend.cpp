@@ -6,30 +6,16 @@
 #include "fbvins/frontend/any_rig.hpp"
 #include "fbvins/frontend/frontend_registry.hpp"
 #include "fbvins/frontend/observe.hpp"
+#include "kept.hpp"
 
 namespace fbvins::python {
 namespace {
 
-/// A reference that ends with the interpreter at the latest, on whatever thread.
-class Kept {
- public:
-  explicit Kept(nb::object object) : object_(std::move(object)) {}
-  Kept(const Kept&) = delete;
-  Kept& operator=(const Kept&) = delete;
-  ~Kept() {
-    if (!Py_IsInitialized()) {
-      (void)object_.release();
-      return;
-    }
-    const nb::gil_scoped_acquire acquired;
-    object_.reset();
-  }
-  nb::handle get() const { return object_; }
-  void reset() { object_.reset(); }
-
- private:
-  nb::object object_;
-};
+/// Of newly_made_frontends().
+std::vector<std::weak_ptr<Kept>>& made() {
+  static std::vector<std::weak_ptr<Kept>> all;
+  return all;
+}
 
 /// What a call in Python gives; its exception as one of C++, whose text the System's error has.
 template <class Call>
@@ -45,12 +31,14 @@ auto called(Call&& call) {
 class PyFrontend final : public Frontend {
  public:
   PyFrontend(const StereoRig& rig, nb::object frontend, double sigma_px)
-      : rig_(rig), frontend_(std::move(frontend)), sigma_px_(sigma_px) {}
+      : rig_(rig), frontend_(std::make_shared<Kept>(std::move(frontend))), sigma_px_(sigma_px) {
+    made().push_back(frontend_);
+  }
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override {
     return called([&] {
       TrackedFrame out;
-      const nb::object found = frontend_.get().attr("process")(packet, prior);
+      const nb::object found = frontend_->get().attr("process")(packet, prior);
       if (!found.is_none()) out.features = features(found);
       out.stats.stereo = static_cast<int>(std::ranges::count_if(out.features, [](const TrackedFeature& f) { return f.right.has_value(); }));
       return out;
@@ -81,7 +69,7 @@ class PyFrontend final : public Frontend {
   }
 
   StereoRig rig_;
-  Kept frontend_;
+  std::shared_ptr<Kept> frontend_;
   double sigma_px_;
 };
 
@@ -118,6 +106,13 @@ Array<double> rows_of(const SensorPacket& packet, Vec3 ImuSample::*vector) {
 }
 
 }  // namespace
+
+std::vector<std::shared_ptr<Kept>> newly_made_frontends() {
+  std::vector<std::shared_ptr<Kept>> out;
+  for (const std::weak_ptr<Kept>& frontend : std::exchange(made(), {}))
+    if (std::shared_ptr<Kept> alive = frontend.lock()) out.push_back(std::move(alive));
+  return out;
+}
 
 void bind_frontend(nb::module_& m) {
   nb::class_<SensorPacket>(m, "SensorPacket", "A frame and the IMU's readings since the frame before: what a frontend is given.")

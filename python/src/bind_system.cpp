@@ -11,6 +11,7 @@
 #include "fbvins/config/config.hpp"
 #include "fbvins/io/imu_state_file.hpp"
 #include "fbvins/pipeline/system.hpp"
+#include "kept.hpp"
 #include "python_types.hpp"
 
 namespace fbvins::python {
@@ -48,9 +49,11 @@ class PySystem {
   PySystem(const Config& config, const StereoRig& rig, bool threaded, nb::object map, nb::object on_odometry,
            nb::object on_map_update, const std::string& state)
       : rig_(rig), map_(std::move(map)), on_odometry_(std::move(on_odometry)), on_map_update_(std::move(on_map_update)) {
+    (void)newly_made_frontends();
     LoopMap* mapper = map_.is_none() ? nullptr : nb::cast<PyMap&>(map_).map.get();
     system_.emplace(value_or_raise(System::create(config, rig, threaded ? RunMode::threaded : RunMode::deterministic,
                                                   {.mapper = mapper, .imu_state = imu_state(state, rig.imu_noise)})));
+    frontends_ = newly_made_frontends();
     system_->on_odometry([this](const Odometry& o) { tell(on_odometry_, o, odometry_); });
     if (mapper != nullptr) system_->on_map_update([this](const MapUpdate& u) { tell(on_map_update_, u, updates_); });
   }
@@ -134,6 +137,7 @@ class PySystem {
   /// For Python's cyclic garbage collector.
   int traverse(visitproc visit, void* arg) const {
     for (const nb::object* held : {&map_, &on_odometry_, &on_map_update_}) Py_VISIT(held->ptr());
+    for (const std::shared_ptr<Kept>& frontend : frontends_) Py_VISIT(frontend->get().ptr());
     return 0;
   }
   void forget() {
@@ -142,6 +146,7 @@ class PySystem {
       (void)system_->finish();
     }
     on_odometry_ = on_map_update_ = nb::none();
+    for (const std::shared_ptr<Kept>& frontend : frontends_) frontend->reset();
   }
 
  private:
@@ -226,6 +231,7 @@ class PySystem {
 
   StereoRig rig_;
   nb::object map_, on_odometry_, on_map_update_;
+  std::vector<std::shared_ptr<Kept>> frontends_;  ///< in Python
   std::mutex mutex_;
   std::deque<Odometry> odometry_;
   std::deque<MapUpdate> updates_;

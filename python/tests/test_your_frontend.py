@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frontends in Python."""
+"""Frontends in Python. The last file: what is registered stays, and configurations written by this process name it."""
 import importlib.util
 import pathlib
 import subprocess
@@ -73,7 +73,7 @@ def test_names_are_unique_and_makers_are_asked(flight):
     with pytest.raises(ValueError, match="no name"):
         fbvins.register_frontend("not a name", Silent)
     with pytest.raises(TypeError, match="callable"):
-        fbvins.register_frontend("nothing", None)
+        fbvins.register_frontend("nothing", 3)
     with pytest.raises(ValueError, match="rigs of mine only"):
         def picky(rig):
             raise RuntimeError("rigs of mine only")
