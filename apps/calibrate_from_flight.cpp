@@ -31,6 +31,7 @@ Result<Flown> fly(const std::string& path, const FromFlightArguments& a) {
   warnings.print((*data)->info());
   Config config;
   config.frontend.kind = "klt";
+  config.estimator.align_time_offset = false;  // it is found by all pieces together, which have the given one
   Result<System> system = System::create(config, (*data)->rig(), RunMode::threaded);
   if (!system) return Error{system.error().code, fmt::format("{}: {}", path, system.error().message)};
   FlightCollector collector;
