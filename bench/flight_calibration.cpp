@@ -49,6 +49,7 @@ Result<Flown> fly(const std::string& path, const std::optional<StereoRig>& rig) 
   if (!data) return data.error();
   Config config;
   config.frontend.kind = "klt";
+  config.estimator.align_time_offset = false;  // as the command flies
   Result<System> system = System::create(config, (*data)->rig(), RunMode::threaded);
   if (!system) return system.error();
   FlightCollector collector;
