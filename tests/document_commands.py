@@ -69,6 +69,8 @@ def faults_of(program, arguments, helps):
         option = word.split("=")[0]
         if re.fullmatch(r"--?[a-z][a-z0-9-]*", option) and option not in known:
             yield f"'{' '.join(name)}' has no option {option}"
+    if "--plugin" in arguments:  # a file that is not here, and a name that it brings along
+        arguments = [word for before, word in zip([""] + arguments, arguments) if not {before, word} & {"--plugin", "--frontend"}]
     said = run(program, *arguments, "--help").stderr.splitlines()
     if said:
         yield said[0]
