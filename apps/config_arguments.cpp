@@ -26,7 +26,9 @@ void ConfigArguments::add_to(CLI::App& command) {
   command.add_option("--config", file, "YAML file that changes the defaults (see fbvins config)");
   command.add_option("--set", assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
   // Before --frontend, to whose names it adds.
-  command.add_option_function<std::vector<std::string>>("--plugin", load_plugins, "shared library with frontends of your own (docs/cpp.md); may be repeated")
+  command
+      .add_option_function<std::vector<std::string>>("--plugin", load_plugins,
+                                                     "shared library with frontends of your own (docs/cpp.md); may be repeated")
       ->take_all()
       ->allow_extra_args(false);
   command.add_option("--frontend", frontend, "the frontend that tracks features")->check(name_of_frontend());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A complete frontend outside of the library, in the simplest way that flies: corners by Harris' measure, found again by comparing
-// blocks of pixels, over time where the gyroscope expects them and in the right image along the epipolar line.
+// A complete frontend outside of the library, in the simplest way that flies: corners by Harris' measure, found again by
+// comparing blocks of pixels, over time where the gyroscope expects them and in the right image along the epipolar line.
 //
 //   fbvins run MH_01_easy --plugin build/libown_frontend.so --frontend blocks
 #include <algorithm>
@@ -17,9 +17,9 @@ namespace {
 
 using namespace fbvins;
 
-constexpr int kHalf = 5, kBlock = 2 * kHalf + 1;             // px
-constexpr int kSearch = 14;                                  // px around the prediction, in each direction
-constexpr double kSigma_px = 0.5, kWorstDifference = 14;     // mean over the block, grey values
+constexpr int kHalf = 5, kBlock = 2 * kHalf + 1;          // px
+constexpr int kSearch = 14;                               // px around the prediction, in each direction
+constexpr double kSigma_px = 0.5, kWorstDifference = 14;  // mean over the block, grey values
 constexpr double kNearest_m = 0.5, kCell_px = 40;
 constexpr int kFeatures = 150;
 
@@ -64,7 +64,8 @@ class BlockFrontend final : public Frontend {
     for (Track& track : tracks_) {
       std::optional<Observation> seen = observe(rig_.left, track.px, kSigma_px);
       if (!seen) continue;
-      out.features.push_back({track.id, seen, packet.frame.right ? in_right(track, *left, *packet.frame.right) : std::nullopt, track.age++});
+      out.features.push_back(
+          {track.id, seen, packet.frame.right ? in_right(track, *left, *packet.frame.right) : std::nullopt, track.age++});
     }
     before_ = left;
     return out;
@@ -82,7 +83,8 @@ class BlockFrontend final : public Frontend {
     Quat q_before_now = Quat::Identity();
     const auto& samples = packet.imu.samples;
     for (std::size_t k = 1; k < samples.size(); ++k) {
-      const Vec3 rate = 0.5 * (samples[k - 1].gyro_radps + samples[k].gyro_radps) - (prior.valid ? prior.bias.gyro_radps : Vec3::Zero());
+      const Vec3 rate =
+          0.5 * (samples[k - 1].gyro_radps + samples[k].gyro_radps) - (prior.valid ? prior.bias.gyro_radps : Vec3::Zero());
       q_before_now = q_before_now * so3_exp(rate * (samples[k].t - samples[k - 1].t).seconds());
     }
     const Mat3 R_BC = rig_.T_BC0.q.toRotationMatrix();
@@ -134,7 +136,10 @@ class BlockFrontend final : public Frontend {
   void detect(const Image& image) {
     const int columns = static_cast<int>(image.width() / kCell_px), rows = static_cast<int>(image.height() / kCell_px);
     std::vector<bool> taken(static_cast<std::size_t>(columns + 1) * static_cast<std::size_t>(rows + 1), false);
-    const auto cell = [&](double x, double y) { return static_cast<std::size_t>(y / kCell_px) * static_cast<std::size_t>(columns + 1) + static_cast<std::size_t>(x / kCell_px); };
+    const auto cell = [&](double x, double y) {
+      return static_cast<std::size_t>(y / kCell_px) * static_cast<std::size_t>(columns + 1) +
+             static_cast<std::size_t>(x / kCell_px);
+    };
     for (const Track& track : tracks_) taken[cell(track.px.x(), track.px.y())] = true;
     for (int row = 0; row < rows; ++row)
       for (int column = 0; column < columns && static_cast<int>(tracks_.size()) < kFeatures; ++column) {
@@ -169,6 +174,7 @@ class BlockFrontend final : public Frontend {
 
 FBVINS_FRONTENDS(add) {
   add({"blocks", "corners found again by comparing blocks of pixels", [](const StereoRig& rig, const FrontendOptions&) {
-         return Result(for_any_rig(rig, kFeatures, [](const StereoRig& cameras) { return std::make_unique<BlockFrontend>(cameras); }));
+         return Result(
+             for_any_rig(rig, kFeatures, [](const StereoRig& cameras) { return std::make_unique<BlockFrontend>(cameras); }));
        }});
 }

@@ -40,7 +40,8 @@ class PyFrontend final : public Frontend {
       TrackedFrame out;
       const nb::object found = frontend_->get().attr("process")(packet, prior);
       if (!found.is_none()) out.features = features(found);
-      out.stats.stereo = static_cast<int>(std::ranges::count_if(out.features, [](const TrackedFeature& f) { return f.right.has_value(); }));
+      out.stats.stereo =
+          static_cast<int>(std::ranges::count_if(out.features, [](const TrackedFeature& f) { return f.right.has_value(); }));
       return out;
     });
   }
@@ -90,7 +91,8 @@ void add_frontend(const std::string& name, nb::object make, const std::string& m
   const auto of_pair = [maker, sigma_px](const StereoRig& rig) -> std::unique_ptr<Frontend> {
     return called([&] { return std::make_unique<PyFrontend>(rig, maker->get()(rig), sigma_px); });
   };
-  const auto of_rig = [of_pair, name, max_features](const StereoRig& rig, const FrontendOptions&) -> Result<std::unique_ptr<Frontend>> {
+  const auto of_rig = [of_pair, name, max_features](const StereoRig& rig,
+                                                    const FrontendOptions&) -> Result<std::unique_ptr<Frontend>> {
     try {
       return for_any_rig(rig, max_features, of_pair);
     } catch (const std::exception& e) {
@@ -116,26 +118,39 @@ std::vector<std::shared_ptr<Kept>> newly_made_frontends() {
 
 void bind_frontend(nb::module_& m) {
   nb::class_<SensorPacket>(m, "SensorPacket", "A frame and the IMU's readings since the frame before: what a frontend is given.")
-      .def_prop_ro("frame", [](const SensorPacket& p) { return p.frame; }, "StereoFrame, of the cameras of the frontend's rig")
-      .def_prop_ro("imu_t", [](const SensorPacket& p) { return column<std::int64_t>(p.imu.samples, [](const ImuSample& s) { return s.t.ns; }); }, "int64 (M,), ns")
-      .def_prop_ro("gyro", [](const SensorPacket& p) { return rows_of(p, &ImuSample::gyro_radps); }, "float64 (M, 3), rad/s in B")
-      .def_prop_ro("accel", [](const SensorPacket& p) { return rows_of(p, &ImuSample::accel_mps2); }, "float64 (M, 3), m/s^2 in B");
+      .def_prop_ro(
+          "frame", [](const SensorPacket& p) { return p.frame; }, "StereoFrame, of the cameras of the frontend's rig")
+      .def_prop_ro(
+          "imu_t",
+          [](const SensorPacket& p) { return column<std::int64_t>(p.imu.samples, [](const ImuSample& s) { return s.t.ns; }); },
+          "int64 (M,), ns")
+      .def_prop_ro(
+          "gyro", [](const SensorPacket& p) { return rows_of(p, &ImuSample::gyro_radps); }, "float64 (M, 3), rad/s in B")
+      .def_prop_ro(
+          "accel", [](const SensorPacket& p) { return rows_of(p, &ImuSample::accel_mps2); }, "float64 (M, 3), m/s^2 in B");
   nb::class_<StatePrior>(m, "StatePrior", "The estimator's newest state, usually of two frames ago, for predictions.")
       .def_ro("valid", &StatePrior::valid, "False before the first start")
-      .def_prop_ro("t", [](const StatePrior& s) { return s.t.ns; }, "ns")
-      .def_prop_ro("T_GB", [](const StatePrior& s) { return to_array(s.T_GB); }, "float64 (4, 4), in the window's own frame G")
-      .def_prop_ro("v", [](const StatePrior& s) { return to_array(s.v_GB); }, "float64 (3,), m/s in G")
-      .def_prop_ro("gyro_bias", [](const StatePrior& s) { return to_array(s.bias.gyro_radps); }, "float64 (3,), rad/s")
-      .def_prop_ro("gravity", [](const StatePrior& s) { return to_array(s.gravity_G); }, "float64 (3,), m/s^2 in G");
-  m.def("register_frontend", &add_frontend, "name"_a, "make"_a, "meaning"_a = "in Python", "max_features"_a = 150, "sigma_px"_a = 0.5,
-        nb::sig("def register_frontend(name: str, make: typing.Callable[[Rig], typing.Any], meaning: str = 'in Python', "
-                "max_features: int = 150, sigma_px: float = 0.5) -> None"),
-        "A frontend of your own under a name, for `run`, `System` and configurations. make(rig) is called for each camera, or pair of\n"
-        "cameras that overlap, and returns an object with process(packet, prior), called with a SensorPacket and a StatePrior for each\n"
-        "frame. It returns (ids, left, right): int64 (N,), numbers that stay as long as a feature is followed, new ones larger than\n"
-        "all before; float64 (N, 2), where it is in the left image, px, the top left pixel's centre being (0, 0), NaN where it is not\n"
-        "seen; the same of the right image, or None. sigma_px: standard deviation of these positions. max_features: what it follows in\n"
-        "a rig of two cameras. ValueError for a name that is taken. A frontend that raises ends the run: RuntimeError with its text.");
+      .def_prop_ro(
+          "t", [](const StatePrior& s) { return s.t.ns; }, "ns")
+      .def_prop_ro(
+          "T_GB", [](const StatePrior& s) { return to_array(s.T_GB); }, "float64 (4, 4), in the window's own frame G")
+      .def_prop_ro(
+          "v", [](const StatePrior& s) { return to_array(s.v_GB); }, "float64 (3,), m/s in G")
+      .def_prop_ro(
+          "gyro_bias", [](const StatePrior& s) { return to_array(s.bias.gyro_radps); }, "float64 (3,), rad/s")
+      .def_prop_ro(
+          "gravity", [](const StatePrior& s) { return to_array(s.gravity_G); }, "float64 (3,), m/s^2 in G");
+  m.def(
+      "register_frontend", &add_frontend, "name"_a, "make"_a, "meaning"_a = "in Python", "max_features"_a = 150,
+      "sigma_px"_a = 0.5,
+      nb::sig("def register_frontend(name: str, make: typing.Callable[[Rig], typing.Any], meaning: str = 'in Python', "
+              "max_features: int = 150, sigma_px: float = 0.5) -> None"),
+      "A frontend of your own under a name, for `run`, `System` and configurations. make(rig) is called for each camera, or pair of\n"
+      "cameras that overlap, and returns an object with process(packet, prior), called with a SensorPacket and a StatePrior for each\n"
+      "frame. It returns (ids, left, right): int64 (N,), numbers that stay as long as a feature is followed, new ones larger than\n"
+      "all before; float64 (N, 2), where it is in the left image, px, the top left pixel's centre being (0, 0), NaN where it is not\n"
+      "seen; the same of the right image, or None. sigma_px: standard deviation of these positions. max_features: what it follows in\n"
+      "a rig of two cameras. ValueError for a name that is taken. A frontend that raises ends the run: RuntimeError with its text.");
 }
 
 }  // namespace fbvins::python

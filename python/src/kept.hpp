@@ -31,8 +31,8 @@ class Kept {
   nb::object object_;
 };
 
-/// The frontends in Python that were made since the last call and are alive: a System shows those that it made to the cyclic garbage
-/// collector.
+/// The frontends in Python that were made since the last call and are alive: a System shows those that it made to the cyclic
+/// garbage collector.
 std::vector<std::shared_ptr<Kept>> newly_made_frontends();
 
 }  // namespace fbvins::python

@@ -7,8 +7,8 @@
 //
 //   fbvins run MH_01_easy --plugin ./libdots.so --frontend dots
 //
-// The library is linked with fbvins::core itself. Compiler, standard library and headers have to be those of the program: C++ objects
-// cross the border. plugin_headers() is compared, what it does not see is the builder's care.
+// The library is linked with fbvins::core itself. Compiler, standard library and headers have to be those of the program: C++
+// objects cross the border. plugin_headers() is compared, what it does not see is the builder's care.
 #pragma once
 
 #include <string>
@@ -32,9 +32,9 @@ inline std::string plugin_headers() {
 }  // namespace fbvins
 
 /// The function that registers a plugin's frontends; its body follows.
-#define FBVINS_FRONTENDS(add)                                                                   \
-  extern "C" __attribute__((visibility("default"))) const char* fbvins_plugin_headers() {       \
-    static const std::string headers = fbvins::plugin_headers();                                \
-    return headers.c_str();                                                                     \
-  }                                                                                             \
+#define FBVINS_FRONTENDS(add)                                                             \
+  extern "C" __attribute__((visibility("default"))) const char* fbvins_plugin_headers() { \
+    static const std::string headers = fbvins::plugin_headers();                          \
+    return headers.c_str();                                                               \
+  }                                                                                       \
   extern "C" __attribute__((visibility("default"))) void fbvins_plugin_frontends(const fbvins::AddFrontend& add)

@@ -127,7 +127,8 @@ RangeMaker::Floor* RangeMaker::floor_of_candidates(const Hit& hit, SlidingWindow
   if (!first && (candidates_.size() < kReadingsOfFloor || since_s < kTimeOfFloor_s)) return nullptr;
   candidates_.clear();
   if (floors_.size() == kMostFloors) {
-    const auto oldest = std::min_element(floors_.begin(), floors_.end(), [](const Floor& a, const Floor& b) { return a.seen < b.seen; });
+    const auto oldest =
+        std::min_element(floors_.begin(), floors_.end(), [](const Floor& a, const Floor& b) { return a.seen < b.seen; });
     window.end_own(oldest->number);
     floors_.erase(oldest);
   }
@@ -158,7 +159,8 @@ std::vector<std::shared_ptr<const Factor>> RangeMaker::make(const NewFrame& f) {
   if (floor == nullptr) return {};
   floor->seen = hit->t;
   std::vector<std::shared_ptr<const Factor>> out;
-  out.push_back(std::make_shared<const RangeFactor>(f.frame.id, floor->number, hit->p_B, std::hypot(hit->sigma_m, floor_sigma_m_)));
+  out.push_back(
+      std::make_shared<const RangeFactor>(f.frame.id, floor->number, hit->p_B, std::hypot(hit->sigma_m, floor_sigma_m_)));
   if (images_show_scale_ || f.of_start || !is_lowest(*floor, f.window)) return out;
   FrameId newest;
   for (const Frame& frame : f.window.frames())

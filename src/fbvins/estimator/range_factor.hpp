@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A rangefinder: what its beam hits lies on a level floor, whose height is a variable of the window (docs/rangefinder.md;
-// docs/derivations/range.md, R1-R3). Heights above the same floor are compared over the whole flight, which shows the scale of one
-// camera. Where the beam comes to a table, a box or a stair another floor begins; readings that lie on none are left out.
+// docs/derivations/range.md, R1-R3). Heights above the same floor are compared over the whole flight, which shows the scale of
+// one camera. Where the beam comes to a table, a box or a stair another floor begins; readings that lie on none are left out.
 #pragma once
 
 #include <optional>
@@ -71,10 +71,10 @@ class RangeMaker : public FactorMaker {
 
   double floor_sigma_m_;
   bool images_show_scale_;
-  FrameId compared_;  ///< the newest keyframe whose distance was found by the floor
-  std::vector<Floor> floors_;     ///< the newest last
-  std::vector<Hit> candidates_;   ///< in a row, that lie on no known floor and on one with each other
-  double left_out_s_ = 0;         ///< by readings that were left out, less those that were not
+  FrameId compared_;             ///< the newest keyframe whose distance was found by the floor
+  std::vector<Floor> floors_;    ///< the newest last
+  std::vector<Hit> candidates_;  ///< in a row, that lie on no known floor and on one with each other
+  double left_out_s_ = 0;        ///< by readings that were left out, less those that were not
   std::optional<Time> newest_;
 };
 

@@ -20,8 +20,8 @@ double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, d
 }
 
 bool moved(const BiasEstimate& from, const BiasEstimate& to, double accel_mps2, double gyro_radps) {
-  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma, to.accel.trace() / 3) >
-             kMoved_sigma ||
+  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma,
+                      to.accel.trace() / 3) > kMoved_sigma ||
          change_sigma(to.bias.gyro_radps - from.bias.gyro_radps, from.gyro, to.gyro, gyro_radps / kMoved_sigma, 0) > kMoved_sigma;
 }
 

@@ -14,13 +14,16 @@ namespace {
 constexpr int kEachBefore = 2, kEachInFlight = 20;
 /// An offset is corrected where it is certain: by this much, and by so many standard deviations.
 constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
-/// A start waits for more pairs where it may be off: 99 % of the solutions of rigs without an offset are nearer (524 of 28 flights).
+/// A start waits for more pairs where it may be off: 99 % of the solutions of rigs without an offset are nearer (524 of 28
+/// flights).
 constexpr double kSuspected_sigma = 1.7;
 /// Before the start one that was found is improved by less.
 constexpr double kImproved_sigma = 1;
-/// In flight, where it was known better than that, so often in a row, and the noise of stamps is a mean of so many solutions: a fault of the gyroscope is no offset.
+/// In flight, where it was known better than that, so often in a row, and the noise of stamps is a mean of so many solutions: a
+/// fault of the gyroscope is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
-/// A line delay likewise: global shutters stay what they are. Where the offset was wrong nobody has calibrated the line delay, either.
+/// A line delay likewise: global shutters stay what they are. Where the offset was wrong nobody has calibrated the line delay,
+/// either.
 constexpr double kLeastLine_s = 8e-6, kCertainLine_sigma = 4, kDoubtedLine_sigma = 2.5;
 /// In flight the correction is made in steps: a pose must not lie before the one before it.
 constexpr Duration kStep{4'000'000};

@@ -26,7 +26,8 @@ class TimeAlignment {
   /// Each frame. True where it was cut by an offset that differs from the frame's before by more than a step in flight, and where
   /// the line delay is another from here on.
   bool add(const TrackedFrame& frame, bool running);
-  /// Whether enough was seen to notice an offset that would spoil a start in motion, and the newest frame was cut by what was found.
+  /// Whether enough was seen to notice an offset that would spoil a start in motion, and the newest frame was cut by what was
+  /// found.
   bool known() const;
   Duration correction() const { return correction_; }
   /// Of the correction, 0 before it is known to anything.
@@ -42,7 +43,8 @@ class TimeAlignment {
 
  private:
   static constexpr double kForgotten_s = 3;
-  /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be wrong by.
+  /// Each pair shows an error of the rotation as well as any, whatever the rate: what their offset is known to, a start may be
+  /// wrong by.
   static constexpr int kFewestForStart = 8, kEnoughForStart = 24;
   static constexpr double kPreciseForStart_s = 0.005;
   /// Where no pairs come, because camera 0 sees too little, a start does not wait for longer than so many images.
@@ -59,8 +61,8 @@ class TimeAlignment {
   Duration correction_{}, found_{};
   double found_sigma_s_ = kUnknown_s;  ///< of the best solution that agrees with what was found
   double line_delay_s_ = 0, jitter_s_ = 0, sigma_s_ = kUnknown_s;
-  bool suspected_ = false;  ///< by the newest solution, what was found is off
-  int solves_ = 0, off_ = 0;  ///< and those in a row that found the offset off
+  bool suspected_ = false;                           ///< by the newest solution, what was found is off
+  int solves_ = 0, off_ = 0;                         ///< and those in a row that found the offset off
   std::optional<Time> changed_;                      ///< the correction, last
   std::optional<GyroAlignmentEstimate> fits_turns_;  ///< the newest solution, where the tracks do
   Time now_;

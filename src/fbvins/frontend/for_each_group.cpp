@@ -29,7 +29,8 @@ std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, int max_features,
 }
 
 std::unique_ptr<Frontend> for_any_rig(const StereoRig& rig, int max_features, FrontendOfPair make) {
-  return for_each_group(rig, max_features, [&make](const StereoRig& cameras) { return std::make_unique<GenericLead>(cameras, make); });
+  return for_each_group(rig, max_features,
+                        [&make](const StereoRig& cameras) { return std::make_unique<GenericLead>(cameras, make); });
 }
 
 }  // namespace fbvins

@@ -11,8 +11,8 @@
 
 namespace fbvins {
 
-/// `lead(cameras)`: the frontend for a rig whose left camera leads; with a pair whose right one does not lead anyway, either of its
-/// cameras can. Each group of cameras has its own. `max_features`: of a rig of one group.
+/// `lead(cameras)`: the frontend for a rig whose left camera leads; with a pair whose right one does not lead anyway, either of
+/// its cameras can. Each group of cameras has its own. `max_features`: of a rig of one group.
 std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, int max_features,
                                          const std::function<std::unique_ptr<LeadingFrontend>(const StereoRig&)>& lead);
 

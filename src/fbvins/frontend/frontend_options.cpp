@@ -42,8 +42,7 @@ Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
 
 std::unique_ptr<Frontend> orb_with(const StereoRig& rig, const OrbFrontendOptions& options,
                                    const std::shared_ptr<DescriptorStage>& stage) {
-  return with_shares(rig, options,
-                        [&](const StereoRig& r, const auto& o) { return std::make_unique<OrbFrontend>(r, o, stage); });
+  return with_shares(rig, options, [&](const StereoRig& r, const auto& o) { return std::make_unique<OrbFrontend>(r, o, stage); });
 }
 
 Made make_orb(const StereoRig& rig, const FrontendOptions& options) { return orb_with(rig, options.orb, make_identity_stage()); }
@@ -73,7 +72,8 @@ bool is_name(const std::string& name) {
 
 Result<void> register_frontend(FrontendKind kind) {
   if (!is_name(kind.name))
-    return Error{ErrorCode::invalid_argument, fmt::format("'{}' is no name of a frontend: letters, digits, '-' and '_'", kind.name)};
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("'{}' is no name of a frontend: letters, digits, '-' and '_'", kind.name)};
   if (std::ranges::find(kinds(), kind.name, &FrontendKind::name) != kinds().end())
     return Error{ErrorCode::invalid_argument, fmt::format("there is a frontend \"{}\" already", kind.name)};
   kinds().push_back(std::move(kind));

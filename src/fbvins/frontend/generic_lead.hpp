@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frontend of any kind as one that can lead a pair (handover.hpp): it gives no tracks to another and takes none, but begins anew.
-// Synchronous; one instance is used by one thread at a time.
+// A frontend of any kind as one that can lead a pair (handover.hpp): it gives no tracks to another and takes none, but begins
+// anew. Synchronous; one instance is used by one thread at a time.
 //
 //   GenericLead lead(rig, [](const StereoRig& r) { return std::make_unique<MyFrontend>(r); });
 #pragma once
@@ -39,9 +39,9 @@ class GenericLead final : public LeadingFrontend {
   StereoRig rig_;
   FrontendOfPair make_;
   std::unique_ptr<Frontend> frontend_;
-  int most_ = 0;  ///< features; 0: as made
-  Time newest_;   ///< image that it was given
-  std::vector<Numbering> numberings_;            ///< in order
+  int most_ = 0;                       ///< features; 0: as made
+  Time newest_;                        ///< image that it was given
+  std::vector<Numbering> numberings_;  ///< in order
   std::int64_t next_own_ = 0, next_id_ = 0;
 };
 

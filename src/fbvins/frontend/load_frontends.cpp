@@ -22,7 +22,8 @@ Result<void> load_frontends(const std::string& plugin) {
   const auto frontends = reinterpret_cast<void (*)(const AddFrontend&)>(dlsym(library, "fbvins_plugin_frontends"));
   if (headers == nullptr || frontends == nullptr) return refused(plugin, "no plugin: it has no FBVINS_FRONTENDS (docs/cpp.md)");
   if (const std::string theirs = headers(); theirs != plugin_headers())
-    return refused(plugin, fmt::format("built with other headers or another compiler: '{}', here '{}'", theirs, plugin_headers()));
+    return refused(plugin,
+                   fmt::format("built with other headers or another compiler: '{}', here '{}'", theirs, plugin_headers()));
   Result<void> registered;
   frontends([&](FrontendKind kind) {
     Result<void> one = register_frontend(std::move(kind));
