@@ -87,7 +87,7 @@ def replayed(program, recording, frontend):
 
 
 def cells(program, flights):
-    """Name and function of each cell; a name that begins with `=` repeats the cell that follows it."""
+    """Name and function of each cell; the run `=FLIGHT FRONTEND HOW` repeats the cell `FLIGHT FRONTEND`."""
     for name in FLIGHTS:
         yield f"{name} rendered", lambda name=name: render(program, name, flights)
     for name in FLIGHTS:
