@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/core/overloaded.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/sink.hpp"
 #include "fbvins/types/anchor.hpp"
@@ -31,13 +32,10 @@ class SensorInput {
 
 /// As what it is.
 inline void push_event(SensorInput& input, SensorEvent event) {
-  struct {
-    SensorInput& to;
-    void operator()(const ImuSample& sample) const { to.push(sample); }
-    void operator()(StereoFrame& frame) const { to.push(std::move(frame)); }
-    void operator()(const RangeSample& reading) const { to.push_range(reading); }
-  } push{input};
-  std::visit(push, event);
+  std::visit(
+      Overloaded{[&](const ImuSample& sample) { input.push(sample); }, [&](StereoFrame& frame) { input.push(std::move(frame)); },
+                 [&](const RangeSample& reading) { input.push_range(reading); }},
+      event);
 }
 
 /// What a check of live sensors says: what was seen, and what to do where it is not fine, or could be better; one sentence.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a recording or a live sensor delivers, one at a time and in order of time. Who takes all of them visits them (overloaded.hpp),
-// so that another kind of sensor is an error of compilation where nobody handles it.
+// What a recording or a live sensor delivers, one at a time and in order of time. Code for every event visits it
+// (core/overloaded.hpp), so that it does not compile until it handles a new kind of sensor.
 #pragma once
 
 #include <variant>

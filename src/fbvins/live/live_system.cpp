@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "fbvins/core/overloaded.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/hub.hpp"
 #include "fbvins/live/ingest.hpp"
@@ -84,15 +85,14 @@ struct LiveSystem::Impl {
 
   void feed() {
     while (std::optional<SensorEvent> event = ingest.pop()) {
-      std::visit([this](const auto& e) { tell_sinks(e); }, *event);
+      std::visit(Overloaded{[this](const ImuSample& sample) { hub.publish(sample); },
+                            [this](const StereoFrame& frame) { hub.publish(frame); },
+                            [](const RangeSample&) {}},  // no sink has a use for it
+                 *event);
       for (Anchor& anchor : ingest.take_anchors()) (void)system.push(std::move(anchor));  // impossible ones are left out
       if (Result<void> taken = system.push(std::move(*event)); !taken) return;            // the watcher reports it
     }
   }
-
-  void tell_sinks(const ImuSample& sample) { hub.publish(sample); }
-  void tell_sinks(const StereoFrame& frame) { hub.publish(frame); }
-  void tell_sinks(const RangeSample&) {}  // no sink has a use for it
 
   void watch_sensors() {
     Time told = host_now();
