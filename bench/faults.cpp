@@ -35,6 +35,7 @@
 #include "fbvins/faults/sensor_faults.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/live/ingest.hpp"
+#include "fbvins/live/source.hpp"
 #include "fbvins/pipeline/system.hpp"
 
 namespace fbvins::bench {
@@ -285,7 +286,7 @@ Errors fly(const Flight& flight, const std::string& frontend, std::vector<Sensor
     FaultyInput faulty(way, faults, seed);
     for (const SensorEvent& event : flight.events) {
       way.now = time_of(event);
-      std::visit([&](const auto& e) { faulty.push(e); }, event);
+      push_event(faulty, event);
     }
   }
   way.finish();

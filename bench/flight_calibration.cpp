@@ -74,7 +74,7 @@ std::string mm(double error_m) { return std::isfinite(error_m) ? fmt::format("{:
 std::string changes(const FlightCalibration& found) {
   std::string out;
   for (const RefinedParameter& p : found.parameters)
-    if (p.flown && p.finding == FlightFinding::refined) out += fmt::format(" {} {:+.3g} +- {:.2g},", p.name, p.change, p.sigma);
+    if (p.finding == FlightFinding::refined) out += fmt::format(" {} {:+.3g} +- {:.2g},", p.name, p.change, p.sigma);
   for (const HeldOutPart& part : found.held_out) out += fmt::format(" {}: {:+.1f};", part.name, part.gain);
   return out + fmt::format(" spread {:.1f}, {:.2f} px", found.spread, found.sigma_px);
 }
