@@ -68,7 +68,7 @@ class ExactFlight {
   Wave waves_[4][3];
 };
 
-/// Sizes of an odometry's errors; the defaults are those of full flights on rendered and real images (docs/results.md).
+/// Sizes of an odometry's errors; the defaults are those of full flights on rendered and real images (docs/benchmarks.md).
 struct OdometryErrors {
   double position_walk_m_rts = 0.002, heading_walk_rad_rts = 4e-4;
   double tilt_rad = 1e-3, tilt_memory_s = 5;

@@ -92,7 +92,7 @@ typedef struct FbvinsSocketImuAxes {
   double gyro_bias_radps[3], accel_bias_mps2[3];
 } FbvinsSocketImuAxes;
 
-/// A depth sensor (docs/depth.md).
+/// A depth sensor (docs/rigs.md).
 typedef struct FbvinsSocketDepth {
   double noise_at_1m_m;  ///< standard deviation at a distance of one metre; it grows with the square of the distance
   double nearest_m, farthest_m;

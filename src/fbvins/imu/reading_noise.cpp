@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMeasured_s = 0.25;
 /// What vibration counts as, of white noise of its size: it swings back and forth, a turn much more than a shift. Of six flights
-/// of a hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/imu_noise.md)
+/// of a hexacopter, whose tracks are followed best with 4e-4 rad/s and 0.048 m/s^2 per root Hz (docs/experiments/consistency.md)
 /// and whose readings have 2.7e-3 and 0.07.
 constexpr double kGyroShare = 0.25, kAccelShare = 1;
 /// Axes and scale that are off make an error of a specific force that changes, for as long as a motion lasts.

@@ -32,7 +32,7 @@ struct ImuSensor {
 
 Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read = {});
 Result<ImuSensor> parse_euroc_imu(YamlReader yaml);
-/// depth0/sensor.yaml of a depth sensor: registered to cam0, or with a lens and a pose of its own (docs/depth.md). `T_BI`: the
+/// depth0/sensor.yaml of a depth sensor: registered to cam0, or with a lens and a pose of its own (docs/rigs.md). `T_BI`: the
 /// IMU's, ImuSensor::T_BS.
 Result<DepthSensor> parse_depth_sensor(YamlReader yaml, const Pose<B, B>& T_BI);
 /// Only the T_BS of a sensor.yaml.
