@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kG_mps2 = 9.80665, kMilliG_mps2 = 1e-3 * kG_mps2, kMicroG_mps2 = 1e-6 * kG_mps2;
 
-/// The sources of these figures are in docs/simulator.md, in the order of this table.
+/// The sources of these figures are in docs/experiments/simulator.md, in the order of this table.
 struct Kit {
   const char* name;
   // Cameras
