@@ -14,7 +14,7 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Identifies the vehicle's response from a flight's log, axis by axis, and proposes gains under PX4's names (docs/tuning.md).
+    R"(Identifies the vehicle's response from a flight's log, axis by axis, and proposes gains under PX4's names (docs/flight.md).
 The flight should excite every axis, as `fbvins fly --identify` does. The log is the folder of `fbvins fly`, or a .ulg of PX4 with
 SDLOG_PROFILE 17 (default and high rate).
 Writes control.yaml (for `fbvins fly --control`), gains.params (for QGroundControl), tuning.txt, tuning.svg (before and after).

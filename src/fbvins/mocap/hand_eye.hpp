@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Extrinsics of the markers on the IMU, pose of the motion capture's world against W, and its clock's offset and drift, from one
-// flight's estimate and markers. Pure functions, any thread. Method and limits: docs/mocap.md.
+// flight's estimate and markers. Pure functions, any thread. Method: docs/derivations/hand_eye.md.
 //
 //   Result<HandEye> found = align_hand_eye(track, estimate, {});
 //   Trajectory<W> truth = body_truth(found->kept, found->calibration);   // T_WB by the estimate's clock

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private to mocap: where the markers sit and how the clocks differ, by maximum likelihood over all pairs of poses with
-// noise that is correlated in time (docs/mocap.md).
+// noise that is correlated in time (docs/derivations/hand_eye.md).
 //
 //   HandEyeSolver solver(curve, estimate, start, options);
 //   solver.run();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a motion-capture system measures of one rigid body. Values.
 //
-//   Pose<V, K> T_VK = T_VW * T_WB * T_BK;   // its measurement, predicted from the odometry (docs/mocap.md)
+//   Pose<V, K> T_VK = T_VW * T_WB * T_BK;   // its measurement, predicted from the odometry (docs/derivations/hand_eye.md)
 #pragma once
 
 #include <vector>
