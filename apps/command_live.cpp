@@ -44,7 +44,7 @@ sources:
   d435i[:SERIAL or FILE.bag][:depth][:848x480@60]  a RealSense camera with an IMU, by its factory calibration (docs/d435i.md)
   oak[:DEVICE][:@HZ], orbbec[:SERIAL][:640x480@30], zed[:/dev/videoN]:672x376  by their makers' Python packages (docs/devices.md)
   v4l2:CAM0,CAM1,...,IMU     video devices, or one with all images side by side; the IMU is a flight controller's (udp:..., serial:...)
-                             or another process's (socket:...); needs --calibration (docs/v4l2.md)
+                             or another process's (socket:...); needs --calibration (docs/devices.md)
 
 examples:
   fbvins live --source replay:MH_01_easy --out out/live

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The same bytes on arm64 as on x86-64 (docs/board.md): Eigen's SSE2 code runs there by SIMDe. FBVINS_BEFORE_EIGEN: the compiler options
+# The same bytes on arm64 as on x86-64 (docs/service.md): Eigen's SSE2 code runs there by SIMDe. FBVINS_BEFORE_EIGEN: the compiler options
 # for it, for sources with SKIP_PRECOMPILE_HEADERS; all others get them from fbvins_flags or with the precompiled headers.
 set(FBVINS_BEFORE_EIGEN "")
 if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")

@@ -50,7 +50,7 @@ def main(source, native, sysroot=None):
         emulate = [emulator, *(["-L", sysroot] if sysroot else [])]
         here, there, neon = sums([f"{folder}/native"]), sums([*emulate, f"{folder}/arm"]), sums([*emulate, f"{folder}/neon"])
     different = [a for a, b in zip(here, there) if a != b]
-    if not has_fma():  # without it a thousandth of the functions' results are rounded otherwise (docs/board.md)
+    if not has_fma():  # without it a thousandth of the functions' results are rounded otherwise (docs/service.md)
         different = [line for line in different if not line.startswith("functions")]
     print(f"{len(here)} hashes; different on arm64: {different or 'none'}; with Eigen's own NEON code: {sum(a != b for a, b in zip(here, neon))}")
     assert len(here) == len(there) and not different

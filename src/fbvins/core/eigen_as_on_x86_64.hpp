@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // On arm64 this makes Eigen run its SSE2 code, each instruction emulated with NEON (SIMDe), instead of its NEON code. Both are
 // correct, but the NEON code fuses multiply-adds and sums in another order, so that a flight's result would differ from
-// that on x86-64 in the last digits, and soon in more (docs/board.md).
+// that on x86-64 in the last digits, and soon in more (docs/service.md).
 //
 // The build includes this before every source file (cmake/FbvinsModule.cmake); no file includes it itself.
 #pragma once

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Linux video devices (V4L2), one a camera, or one with the images of all cameras side by side, and an IMU from elsewhere
-// (docs/v4l2.md).
+// (docs/devices.md).
 //
 //   auto source = V4l2Source::open("/dev/video0,/dev/video2,serial:/dev/ttyS4:921600", options);
 //   Result<void> end = (*source)->run(live.input());    // until stop(); a device that is unplugged is waited for
