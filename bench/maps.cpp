@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "bench/changed_rooms.hpp"
 #include "bench/room_days.hpp"
+#include "bench/room_looker.hpp"
 #include "fbvins/config/config.hpp"
 #include "fbvins/eval/alignment.hpp"
 #include "fbvins/eval/association.hpp"
