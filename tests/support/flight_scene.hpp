@@ -3,8 +3,6 @@
 // and where the cameras see the points of a room. Pure functions; fixed seeds.
 #pragma once
 
-#include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "fbvins/calibration/flight_rig.hpp"

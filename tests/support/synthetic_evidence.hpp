@@ -3,8 +3,6 @@
 // closed form.
 #pragma once
 
-#include <cmath>
-
 #include "fbvins/core/rng.hpp"
 #include "fbvins/doctor/evidence.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
