@@ -60,19 +60,12 @@ class SyntheticTracks {
     if (located_.size() > 4 * corners_.size()) forget_ended_tracks();
   }
 
-  /// The k-th image; in order. `prior` is the estimator's, of some image before.
-  TrackedFrame frame(std::size_t k, const StatePrior& prior) {
-    TrackedFrame out = frame_at(FrameId{static_cast<std::int64_t>(k)}, flight_.frames[k], prior);
-    if (k > 0) out.imu = readings(flight_.frames[k - 1], out.t);
-    return out;
-  }
-
   /// No track goes on.
   void lose_all() {
     for (auto& [corner, track] : tracks_) track.followed = false;
   }
 
-  /// The same at any stamp, in order, without IMU readings; the right image taken at `right_t`.
+  /// At any stamp, in order, without IMU readings; the right image taken at `right_t`. `prior` is the estimator's, of some image before.
   TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior) { return frame_at(id, t, prior, t); }
   TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior, Time right_t) {
     TrackedFrame out;
@@ -114,23 +107,6 @@ class SyntheticTracks {
     for (const auto& [corner, track] : tracks_)
       if (const auto known = located_.find(track.id); known != located_.end()) kept.insert(*known);
     located_ = std::move(kept);
-  }
-
-  ImuSegment readings(Time from, Time to) {
-    ImuSegment out;
-    const std::vector<ImuSample>& all = flight_.imu.samples;
-    const auto at = [&](Time t) {
-      auto next = std::lower_bound(all.begin() + 1, all.end() - 1, t, [](const ImuSample& s, Time x) { return s.t < x; });
-      const ImuSample &a = *(next - 1), &b = *next;
-      const double u = (t - a.t).seconds() / (b.t - a.t).seconds();
-      return ImuSample{t, Vec3((1 - u) * a.gyro_radps + u * b.gyro_radps), Vec3((1 - u) * a.accel_mps2 + u * b.accel_mps2)};
-    };
-    out.samples.push_back(at(from));
-    for (auto s = std::upper_bound(all.begin(), all.end(), from, [](Time x, const ImuSample&a) { return x < a.t; });
-         s != all.end() && s->t < to; ++s)
-      out.samples.push_back(*s);
-    out.samples.push_back(at(to));
-    return out;
   }
 
   std::optional<Observation> observe(const Camera& camera, const Vec3& p_C, const Vec2& slide) {

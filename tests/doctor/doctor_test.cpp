@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/faults/setup_faults.hpp"
+#include "tests/support/setup_faults.hpp"
 #include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
