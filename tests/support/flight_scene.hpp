@@ -8,7 +8,7 @@
 #include "fbvins/calibration/flight_rig.hpp"
 #include "fbvins/calibration/flight_tracks.hpp"
 #include "fbvins/calibration/flight_view_term.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins::test {
 

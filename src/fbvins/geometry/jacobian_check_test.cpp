@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/geometry/jacobian_check.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 #include <gtest/gtest.h>
 
