@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "fbvins/doctor/diagnose.hpp"
-#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "tests/support/setup_faults.hpp"
 
 namespace fbvins::bench {
 
@@ -35,7 +35,7 @@ inline Result<Recorded> record(const std::string& path) {
   out.rig = (*data)->rig();
   while (auto event = (*data)->next()) {
     if (auto* sample = std::get_if<ImuSample>(&*event)) out.readings.push_back(*sample);
-    else out.frames.push_back(std::get<StereoFrame>(*event));
+    else if (auto* frame = std::get_if<StereoFrame>(&*event)) out.frames.push_back(std::move(*frame));
   }
   for (const TrajectoryPoint& p : (*data)->ground_truth()) out.truth.push_back({p.t, p.T_WB});
   return out;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A flight controller's bytes, as a fuzz target: the decoder with and without signing, its readings, its clock.
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/live/mavlink_imu.hpp"
 #include "fbvins/live/mavlink_session.hpp"

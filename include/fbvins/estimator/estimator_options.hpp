@@ -31,14 +31,12 @@ struct KeyframeOptions {
 
 struct KnownLandmarkOptions {
   bool enabled = true;
-  int capacity = 20000;  ///< landmarks remembered
-  double position_sigma_m = 0.01;
+  int capacity = 20000;            ///< landmarks remembered
+  double position_sigma_m = 0.01;  ///< of a landmark's position, in addition to that of its triangulation; set by tests
 
   template <class V>
   void visit(V&& v) {
     v("enabled", enabled, "", "re-observed landmarks constrain the window");
-    v("position_sigma_m", position_sigma_m, "m",
-      "standard deviation of a remembered landmark's position, in addition to that of its triangulation", 1e-4, 1.0);
   }
 };
 

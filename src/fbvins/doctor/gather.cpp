@@ -2,7 +2,6 @@
 #include "fbvins/doctor/gather.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/depth_reader.hpp"

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cmath>
-#include <vector>
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/imu/nav_state.hpp"

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "fbvins/core/angle.hpp"
-#include "fbvins/faults/setup_fault_lists.hpp"
+#include "tests/support/setup_fault_lists.hpp"
 
 namespace fbvins::setup_fault {
 namespace {

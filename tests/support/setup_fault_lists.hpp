@@ -3,7 +3,7 @@
 #pragma once
 
 #include "fbvins/core/angle.hpp"
-#include "fbvins/faults/setup_faults.hpp"
+#include "tests/support/setup_faults.hpp"
 
 namespace fbvins::setup_fault {
 

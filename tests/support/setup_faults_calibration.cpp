@@ -5,7 +5,7 @@
 
 #include "fbvins/camera/scaled_lens.hpp"
 #include "fbvins/doctor/lens_change.hpp"
-#include "fbvins/faults/setup_fault_lists.hpp"
+#include "tests/support/setup_fault_lists.hpp"
 
 namespace fbvins::setup_fault {
 namespace {

@@ -11,7 +11,7 @@
 #include "fbvins/estimator/standstill_factor.hpp"
 #include "fbvins/estimator/surface_factor.hpp"
 #include "fbvins/estimator/window_problem.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins::test {
 

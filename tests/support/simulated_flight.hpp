@@ -15,8 +15,8 @@
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
 #include "fbvins/types/tracking.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins::test {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "fbvins/faults/setup_fault_lists.hpp"
+#include "tests/support/setup_fault_lists.hpp"
 
 namespace fbvins::setup_fault {
 namespace {

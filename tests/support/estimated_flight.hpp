@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "fbvins/estimator/estimator.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
 #include "fbvins/geometry/so3.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins::test {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/faults/setup_faults.hpp"
+#include "tests/support/setup_faults.hpp"
 
 #include <array>
 
-#include "fbvins/faults/setup_fault_lists.hpp"
+#include "tests/support/setup_fault_lists.hpp"
 
 namespace fbvins {
 
