@@ -58,7 +58,7 @@ struct Flight {
 };
 
 Time time_of(const SensorEvent& event) {
-  return std::visit([](const auto& e) { return e.t; }, event);
+  return stamp_of(event);
 }
 
 Result<Flight> load(const std::string& path) {

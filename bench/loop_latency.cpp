@@ -29,7 +29,7 @@ std::vector<double> play(const std::vector<SensorEvent>& events, const StereoRig
     const auto now = Clock::now();
     ms.push_back(std::chrono::duration<double, std::milli>(now - arrived[static_cast<std::size_t>(o.id.value)]).count());
   });
-  const auto time_of = [](const SensorEvent& e) { return std::visit([](const auto& x) { return x.t; }, e); };
+  const auto time_of = [](const SensorEvent& e) { return stamp_of(e); };
   const Time t0 = time_of(events.front());
   const auto start = Clock::now();
   std::size_t frames = 0;

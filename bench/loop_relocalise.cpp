@@ -33,7 +33,7 @@ Trajectory<W> truth_of(const Dataset& data) {
 void fly(const std::string& path, System& system, Time from, Time to, const auto& stop) {
   const auto data = open_dataset(path);
   while (auto event = (*data)->next()) {
-    const Time t = std::visit([](const auto& e) { return e.t; }, *event);
+    const Time t = stamp_of(*event);
     if (t < from || t >= to) continue;
     if (!system.push(std::move(*event))) break;  // finish() says why
     if (stop()) break;

@@ -249,12 +249,12 @@ Figures measure_real(const std::string& path, bool& consecutive, std::vector<Tim
   truth = (*data)->ground_truth();
   Meter meter((*data)->rig(), consecutive);
   while (auto event = (*data)->next()) {
-    if (const auto* sample = std::get_if<ImuSample>(&*event)) meter.imu(*sample);
-    else {
-      const auto& frame = std::get<StereoFrame>(*event);
-      stamps.push_back(frame.t);
-      meter.frame(frame);
-    }
+    std::visit(Overloaded{[&](const ImuSample& sample) { meter.imu(sample); }, [](const AidingSample&) {},
+                          [&](const StereoFrame& frame) {
+                            stamps.push_back(frame.t);
+                            meter.frame(frame);
+                          }},
+               *event);
   }
   return meter.finish(truth);
 }
@@ -294,16 +294,15 @@ Figures measure_rendered(const SimulationOptions& options, bool consecutive, con
   Dataset data(std::move(contents), {});
   Meter meter(simulation->rig, consecutive);
   while (auto event = data.next()) {
-    if (const auto* sample = std::get_if<ImuSample>(&*event)) {
-      meter.imu(*sample);
-      continue;
-    }
-    StereoFrame frame = std::get<StereoFrame>(*event);
-    if (jpeg_quality > 0) {
-      frame.left = through_jpeg(*frame.left, jpeg_quality);
-      frame.right = through_jpeg(*frame.right, jpeg_quality);
-    }
-    meter.frame(frame);
+    std::visit(Overloaded{[&](const ImuSample& sample) { meter.imu(sample); }, [](const AidingSample&) {},
+                          [&](StereoFrame& frame) {
+                            if (jpeg_quality > 0) {
+                              frame.left = through_jpeg(*frame.left, jpeg_quality);
+                              frame.right = through_jpeg(*frame.right, jpeg_quality);
+                            }
+                            meter.frame(frame);
+                          }},
+               *event);
   }
   return meter.finish(truth);
 }
