@@ -109,6 +109,8 @@ Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, L
   for (const std::string& address : arguments.mavlink) {
     auto sink = MavlinkSink::create(address, flight.config.live.mavlink);
     if (!sink) return sink.error();
+    if (flight.config.live.mavlink.sensors.any())
+      (*sink)->on_reading([&live](const AidingSample& reading) { live.push_of_host(reading); });
     live.add_sink(*std::move(sink));
   }
   if (!arguments.out.empty()) add_files(arguments, flight, live, troubles);

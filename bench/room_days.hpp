@@ -37,7 +37,7 @@ struct Day {
 };
 
 inline Time stamp_of(const SensorEvent& event) {
-  return std::visit([](const auto& e) { return e.t; }, event);
+  return stamp_of(event);
 }
 
 struct RoomOfDays {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to bags: the fields of a message one after the other, in ROS 1's encoding (packed) or in CDR, as ROS 2 has it. Messages
+// Private: the fields of a message one after the other, in ROS 1's encoding (packed) or in CDR, as ROS 2 has it. Messages
 // that both have in common are read by one function. After the first incomplete field all are zero or empty.
 //
 //   MessageFields in(bytes, Encoding::ros1);
