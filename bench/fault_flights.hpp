@@ -26,10 +26,6 @@ struct Flight {
   std::shared_ptr<const Simulation> simulation = nullptr;  ///< of tracks
 };
 
-inline Time time_of(const SensorEvent& event) {
-  return std::visit([](const auto& e) { return e.t; }, event);
-}
-
 inline Result<Flight> load(const std::string& path) {
   auto opened = open_dataset(path);
   if (!opened) return opened.error();
@@ -39,7 +35,7 @@ inline Result<Flight> load(const std::string& path) {
   for (const TrajectoryPoint& p : data.ground_truth()) flight.truth.push_back({p.t, {p.T_WB.q, p.T_WB.p}});
   if (flight.events.empty() || flight.truth.size() < 2)
     return Error{ErrorCode::invalid_argument, fmt::format("{}: a flight with ground truth is needed", path)};
-  flight.begin = time_of(flight.events.front()), flight.end = time_of(flight.events.back());
+  flight.begin = stamp_of(flight.events.front()), flight.end = stamp_of(flight.events.back());
   return flight;
 }
 
@@ -63,7 +59,7 @@ inline Result<Flight> prepare(const std::string& text, double seconds) {
       flight.events.emplace_back(faulty_frame(simulation->frames[frame]));
   };
   for (const ImuSample& sample : simulation->imu.samples) add_frames(sample.t), flight.events.emplace_back(sample);
-  flight.begin = time_of(flight.events.front()), flight.end = time_of(flight.events.back());
+  flight.begin = stamp_of(flight.events.front()), flight.end = stamp_of(flight.events.back());
   for (const TrueState& state : simulation->imu.truth) {
     const Pose<W, B> T = simulation->flight.pose((state.t - simulation->start).seconds());
     flight.truth.push_back({state.t, {T.q, T.p}});

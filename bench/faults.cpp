@@ -222,7 +222,7 @@ Errors fly(const Flight& flight, const std::string& frontend, std::vector<Sensor
   {
     FaultyInput faulty(way, faults, seed);
     for (const SensorEvent& event : flight.events) {
-      way.now = time_of(event);
+      way.now = stamp_of(event);
       push_event(faulty, event);
     }
   }
