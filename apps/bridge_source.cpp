@@ -141,7 +141,7 @@ class BridgeSource final : public Source {
     }
     void push(StereoFrame frame) override { input_.push(std::move(frame)); }
     void push_anchor(Anchor anchor) override { input_.push_anchor(std::move(anchor)); }
-    void push_range(const RangeSample& reading) override { input_.push_range(reading); }
+    void push_aiding(const AidingSample& reading) override { input_.push_aiding(reading); }
 
    private:
     SensorInput& input_;

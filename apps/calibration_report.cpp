@@ -3,14 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "apps/calibration_page.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 #include "fbvins/core/angle.hpp"
-#include "fbvins/core/atomic_file.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -194,16 +192,11 @@ std::vector<NamedText> rig_files(const RigCalibration& rig) {
 }
 
 Result<void> write_calibration(const CalibrationOutcome& outcome, const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
   std::vector<NamedText> files = rig_files(rig_of(outcome));
   files.insert(files.end(), {{"summary.json", calibration_summary_json(outcome)},
                              {"calibration.txt", calibration_text(outcome)},
                              {"calibration.html", calibration_html(outcome)}});
-  for (const auto& [name, text] : files)
-    if (Result<void> done = write_file_atomically(folder + "/" + name, text); !done) return done;
-  return {};
+  return write_files(folder, files);
 }
 
 }  // namespace fbvins::app

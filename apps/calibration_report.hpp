@@ -10,6 +10,7 @@
 #include "fbvins/calibration/camera_calibration.hpp"
 #include "fbvins/calibration/imu_camera.hpp"
 #include "fbvins/calibration/weak_parts.hpp"
+#include "fbvins/core/atomic_file.hpp"
 
 namespace fbvins::app {
 
@@ -32,10 +33,6 @@ std::vector<std::string> all_remarks(const CalibrationOutcome& outcome);
 std::string calibration_text(const CalibrationOutcome& outcome);
 std::string calibration_summary_json(const CalibrationOutcome& outcome);
 
-/// Name and content of a file.
-struct NamedText {
-  std::string name, text;
-};
 /// A rig in all formats: camchain.yaml or camchain-imucam.yaml and imu.yaml, calibration.json, camera_info_camN.yaml.
 std::vector<NamedText> rig_files(const RigCalibration& rig);
 

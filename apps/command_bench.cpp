@@ -44,12 +44,11 @@ struct Arguments {
 
 Result<void> write_all(const Arguments& a, const std::string& title, const std::vector<CellResult>& results,
                        const nlohmann::ordered_json& payload) {
-  if (Result<void> done = write_file_atomically(a.out + "/results.csv", results_csv(results)); !done) return done;
-  if (Result<void> done = write_file_atomically(a.out + "/results.json", results_json(title, results).dump(1) + "\n"); !done)
-    return done;
   const std::string provenance = fmt::format("fbvins {} on {}\n\n", FBVINS_VERSION, describe_machine());
-  if (Result<void> done = write_file_atomically(a.out + "/tables.md", provenance + markdown(payload)); !done) return done;
-  return write_file_atomically(a.out + "/report.html", report_html({}, payload, {.title = title}));
+  return write_files(a.out, {{"results.csv", results_csv(results)},
+                             {"results.json", results_json(title, results).dump(1) + "\n"},
+                             {"tables.md", provenance + markdown(payload)},
+                             {"report.html", report_html({}, payload, {.title = title})}});
 }
 
 int list_cells(const Plan& plan) {

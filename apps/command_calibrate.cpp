@@ -4,10 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include "apps/calibrate_from_flight.hpp"
+#include "apps/calibrate_imu_noise.hpp"
 #include "apps/calibration_report.hpp"
 #include "apps/commands.hpp"
 #include "apps/guided_calibration.hpp"
@@ -18,7 +18,6 @@
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/board_detector.hpp"
 #include "fbvins/calibration/detect_board.hpp"
-#include "fbvins/calibration/imu_noise.hpp"
 #include "fbvins/calibration/target_file.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/calibration.hpp"
@@ -245,9 +244,7 @@ int calibrate(const Arguments& a) {
   if (a.target.empty()) return fail("--target is missing: the board's description (`fbvins target` writes one)");
   const Result<Board> board = load_target(a.target);
   if (!board) return fail(board.error().message);
-  std::error_code error;
-  std::filesystem::create_directories(a.out, error);
-  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
+  if (Result<void> made = make_folders(a.out); !made) return fail(made.error().message);
   if (!a.source.empty()) return calibrate_live(a, *board);
   const Result<Material> material = gather(a, *board, nullptr);
   if (!material) return fail(material.error().message);
@@ -259,34 +256,6 @@ int calibrate(const Arguments& a) {
     if (Result<void> done = write_file_atomically(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
       return fail(done.error().message);
   return conclude(a, *board, *material);
-}
-
-int measure_noise(const Arguments& a) {
-  std::vector<ImuSample> readings;
-  if (std::filesystem::path(a.imu_noise).extension() == ".csv") {
-    Result<std::vector<ImuSample>> read = read_imu_csv(a.imu_noise);
-    if (!read) return fail(read.error().message);
-    readings = *std::move(read);
-  } else {
-    Result<CameraRecording> recording = open_cameras(a.imu_noise, a.topics);
-    if (!recording) return fail(recording.error().message);
-    readings = std::move(recording->imu);
-  }
-  const Result<ImuNoiseResult> found = measure_imu_noise(readings);
-  if (!found) {
-    fail(found.error().message);
-    return kEstimationFailed;
-  }
-  std::error_code error;
-  std::filesystem::create_directories(a.out, error);
-  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
-  const std::string text = imu_noise_to_kalibr(*found, "/imu0");
-  if (Result<void> done = write_file_atomically(a.out + "/imu.yaml", text); !done) return fail(done.error().message);
-  if (a.quiet) return kOk;
-  fmt::print("{:.1f} s at rest\n{}", found->duration_s, text);
-  for (const std::string& warning : found->warnings) fmt::print("note: {}\n", warning);
-  fmt::print("written to {}\n", bold(a.out + "/imu.yaml"));
-  return kOk;
 }
 
 /// What is estimated, and from how much.
@@ -354,7 +323,7 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
     exit_code = !a->from_flight.empty()
                     ? calibrate_from_flight({a->from_flight, a->calibration, a->imu_calibration, a->out, a->topics, a->quiet})
                 : a->imu_noise.empty() ? calibrate(*a)
-                                       : measure_noise(*a);
+                                       : measure_imu_noise({a->imu_noise, a->out, a->topics, a->quiet});
   });
 }
 

@@ -160,9 +160,7 @@ Result<void> write_as_run(const Arguments& a, const Config& config, const Flight
   summary.wall_s = wall_s;
   if (Result<void> done = write_run(flight.run, a.out); !done) return done;
   if (Result<void> done = write_truth(flight.run.images(), truth, a.out); !done) return done;
-  if (Result<void> done = write_file_atomically(a.out + "/config.yaml", to_yaml(config)); !done) return done;
-  if (Result<void> done = write_file_atomically(a.out + "/summary.json", to_json_text(summary)); !done) return done;
-  return write_file_atomically(a.out + "/summary.txt", to_text(summary));
+  return write_summary(summary, config, a.out);
 }
 
 /// The gains that were flown.
@@ -177,9 +175,7 @@ int fly_mission(Arguments a) {
   if (a.out.empty()) a.out = fmt::format("out/{}-{}-s{}-{}", a.mission_name(), a.preset, a.seed, config->frontend.kind);
   const Result<FlightSetup> setup = setup_of(a, *config);
   if (!setup) return fail(setup.error().message);
-  std::error_code error;
-  std::filesystem::create_directories(a.out, error);
-  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
+  if (Result<void> made = make_folders(a.out); !made) return fail(made.error().message);
 
   const auto start = std::chrono::steady_clock::now();
   const Result<FlightRun> flight = flown(a, *config, *setup);
@@ -189,8 +185,8 @@ int fly_mission(Arguments a) {
   const FlightFacts facts{a.mission_name(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, setup->controller.kind};
   for (const Result<void>& done :
        {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out), write_control(*setup, a.out),
-        write_file_atomically(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
-        write_file_atomically(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
+        write_files(a.out, {{"flight.json", flight_json_text(facts, flight->log, summary)},
+                            {"flight.txt", flight_text(facts, flight->log, summary)}})})
     if (!done) return fail(done.error().message);
   if (!a.quiet) fmt::print("{}results in {}\n", flight_text(facts, flight->log, summary), bold(a.out));
   return summary.arrived ? kOk : kEstimationFailed;

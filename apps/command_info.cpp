@@ -116,6 +116,8 @@ void print_text(const Dataset& data) {
   fmt::print("{:<14}{} samples at {:.1f} Hz, longest gap {:.3f} s, {} rows left out\n", "imu", info.imu_samples, info.imu_rate_hz,
              info.longest_imu_gap.seconds(), info.imu_rows.bad());
   print_imu_calibration(data.rig().imu_noise);
+  for (const AidingCount& sensor : info.aiding)
+    fmt::print("{:<14}{} readings at {:.1f} Hz\n", sensor.name, sensor.readings, sensor.rate_hz);
   fmt::print("{:<14}{} poses\n", "ground truth", info.ground_truth_poses);
 }
 

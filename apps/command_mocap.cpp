@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 #include <memory>
 
 #include "apps/commands.hpp"
 #include "apps/mocap_report.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/trajectory.hpp"
 
 namespace fbvins::app {
@@ -55,9 +55,7 @@ Result<std::optional<AxisErrors>> measure(const Arguments& arguments, const Hand
 }
 
 Result<void> write_truth_file(const Trajectory<W>& truth, const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
+  if (Result<void> made = make_folders(folder); !made) return made;
   auto writer = TumWriter::create(folder + "/truth_tum.txt");
   if (!writer) return writer.error();
   for (const StampedPose<W>& pose : truth) writer->write(pose.t, pose.T);

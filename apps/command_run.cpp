@@ -13,6 +13,7 @@
 #include "apps/progress.hpp"
 #include "apps/run_flight.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/no_pose.hpp"
 
 namespace fbvins::app {
@@ -48,10 +49,8 @@ struct Arguments {
 Result<std::string> make_folder(const Arguments& arguments, const Config& config, const Dataset& data) {
   const std::string folder =
       arguments.out.empty() ? fmt::format("out/{}-{}", data.info().name, config.frontend.kind) : arguments.out;
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
-  if (std::filesystem::exists(folder + "/summary.json", error))
+  if (Result<void> made = make_folders(folder); !made) return made.error();
+  if (std::error_code ignored; std::filesystem::exists(folder + "/summary.json", ignored))
     note(fmt::format("{}: holds the results of an earlier run, which are overwritten", folder));
   return folder;
 }

@@ -42,10 +42,8 @@ int make_target(const Arguments& a) {
   if (!(board.size_m > 0)) return fail(fmt::format("{} x {} are too many for {}", a.columns, a.rows, a.paper));
   const Result<Drawing> page = draw_target(board, a.paper, a.border);
   if (!page) return fail(page.error().message);
-  std::error_code error;
-  const std::filesystem::path folder = std::filesystem::path(a.out).parent_path();
-  if (!folder.empty()) std::filesystem::create_directories(folder, error);
-  if (error) return fail(fmt::format("{}: {}", folder.string(), error.message()));
+  if (const std::string folder = std::filesystem::path(a.out).parent_path().string(); !folder.empty())
+    if (Result<void> made = make_folders(folder); !made) return fail(made.error().message);
   for (const Result<void>& done :
        {write_file_atomically(a.out + ".pdf", to_pdf(*page)), write_file_atomically(a.out + ".svg", to_svg(*page)),
         write_file_atomically(a.out + ".yaml", target_to_yaml(board))})

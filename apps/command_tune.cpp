@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -37,15 +36,12 @@ int tune_gains(const Arguments& a) {
   const Result<VehicleFit> fit = fit_vehicle(*log);
   if (!fit) return fail(fit.error().message);
   const Tuning tuning = tune(*log, *fit, a.options);
-  std::error_code error;
-  std::filesystem::create_directories(a.out, error);
-  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   const std::string text = tuning_text(tuning, a.options);
-  for (const Result<void>& done :
-       {write_file_atomically(a.out + "/control.yaml", control_yaml(tuning.proposed)),
-        write_file_atomically(a.out + "/gains.params", px4_parameter_file(tuning)),
-        write_file_atomically(a.out + "/tuning.txt", text), write_file_atomically(a.out + "/tuning.svg", tuning_svg(tuning))})
-    if (!done) return fail(done.error().message);
+  const Result<void> done = write_files(a.out, {{"control.yaml", control_yaml(tuning.proposed)},
+                                                {"gains.params", px4_parameter_file(tuning)},
+                                                {"tuning.txt", text},
+                                                {"tuning.svg", tuning_svg(tuning)}});
+  if (!done) return fail(done.error().message);
   if (!a.quiet) fmt::print("{}results in {}\n", text, bold(a.out));
   return kOk;
 }

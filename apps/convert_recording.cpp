@@ -26,20 +26,9 @@ struct Sink {
   std::function<Result<void>()> finish;
 };
 
-/// Files of which nobody has said how a range is written.
-template <class Writer>
-Result<void> add_to(Writer& writer, const RangeSample& reading) {
-  if constexpr (requires { writer.add(reading); }) return writer.add(reading);
-  else return Error{ErrorCode::unsupported, "the recording has ranges (range0), which are written to a folder alone"};
-}
-template <class Writer, class Event>
-Result<void> add_to(Writer& writer, const Event& event) {
-  return writer.add(event);
-}
-
 template <class Writer>
 Sink sink_of(std::shared_ptr<Writer> writer) {
-  return {[writer](const SensorEvent& event) { return std::visit([&](const auto& value) { return add_to(*writer, value); }, event); },
+  return {[writer](const SensorEvent& event) { return std::visit([&](const auto& value) { return writer->add(value); }, event); },
           [writer](const TrajectoryPoint& point) { return writer->add_truth(point.t, point.T_WB); },
           [writer](const StampedPose<W>& pose) { return writer->add_odometry(pose.t, pose.T); },
           [writer] { return writer->finish(); }};
@@ -51,16 +40,22 @@ struct EurocSink {
   EurocFolder folder;
   std::vector<TrajectoryPoint> truth;
   std::vector<ImuSample> readings;
-  std::vector<RangeSample> ranges;
+  std::vector<AidingSample> aiding;
+  Duration time_offset;
   Trajectory<W> odometry;
 
   Result<void> add(const ImuSample& reading) { return readings.push_back(reading), Result<void>{}; }
   Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t + frame.offsets.of(1)); }
-  Result<void> add(const RangeSample& reading) { return ranges.push_back(reading), Result<void>{}; }
+  /// The folder's stamps are on the IMU's clock.
+  Result<void> add(const AidingSample& reading) {
+    AidingSample& added = aiding.emplace_back(reading);
+    stamp_of(added) = stamp_of(reading) + time_offset;
+    return {};
+  }
   Result<void> add_truth(Time, const Pose<W, B>&) { return {}; }
   Result<void> add_odometry(Time t, const Pose<W, B>& T_WB) { return odometry.push_back({t, T_WB}), Result<void>{}; }
   Result<void> finish() {
-    if (Result<void> done = folder.add_ranges(ranges); !done) return done;
+    if (Result<void> done = folder.add_aiding(aiding); !done) return done;
     if (Result<void> done = folder.finish(readings, truth); !done || odometry.empty()) return done;
     auto tum = TumWriter::create(path + "/odometry_tum.txt");
     if (!tum) return tum.error();
@@ -114,7 +109,7 @@ Result<Sink> make_sink(const ConvertTarget& target, const Dataset& data) {
   }
   auto folder = EurocFolder::create(out, data.rig(), "converted by fbvins");
   if (!folder) return folder.error();
-  return sink_of(std::make_shared<EurocSink>(EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}, {}}));
+  return sink_of(std::make_shared<EurocSink>(EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}, Duration::from_seconds(data.rig().time_offset_s), {}}));
 }
 
 /// An image's camera_info goes with it, and lies where ROS's programs look for it.
@@ -155,7 +150,7 @@ Result<int> write_events(Dataset& data, const ConvertedRecord& record, const Con
     return taken ? poses.add_until(t) : taken;
   };
   while (auto event = data.next()) {
-    const Time t = std::visit([](const auto& value) { return value.t; }, *event);
+    const Time t = stamp_of(*event);
     if (Result<void> taken = add_until(t); !taken) return taken.error();
     if (Result<void> taken = sink->add(*event); !taken) return taken.error();
     if (std::holds_alternative<StereoFrame>(*event)) on_frame(++frames);

@@ -32,7 +32,7 @@ class FirstLook final : public SensorInput {
     next_.push(std::move(frame));
   }
   void push_anchor(Anchor anchor) override { next_.push_anchor(std::move(anchor)); }
-  void push_range(const RangeSample& reading) override { next_.push_range(reading); }
+  void push_aiding(const AidingSample& reading) override { next_.push_aiding(reading); }
 
  private:
   void look_at(const SensorEvent& event);

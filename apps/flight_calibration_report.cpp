@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "apps/calibration_report.hpp"
@@ -101,15 +100,10 @@ std::string flight_calibration_json(const FlightCalibration& found, const std::v
 
 Result<void> write_flight_calibration(const FlightCalibration& found, const std::vector<std::string>& runs,
                                       const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
   std::vector<NamedText> files = rig_files(rig_calibration(found.rig));
   files.insert(files.end(),
                {{"summary.json", flight_calibration_json(found, runs)}, {"calibration.txt", flight_calibration_text(found)}});
-  for (const auto& [name, text] : files)
-    if (Result<void> done = write_file_atomically(folder + "/" + name, text); !done) return done;
-  return {};
+  return write_files(folder, files);
 }
 
 }  // namespace fbvins::app

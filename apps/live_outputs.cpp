@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <utility>
 
 #include "apps/imu_state.hpp"
@@ -14,6 +13,7 @@
 #include "apps/terminal.hpp"
 #include "apps/web_page.hpp"
 #include "fbvins/config/config_file.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/live/service_sink.hpp"
 #include "fbvins/live/status_sink.hpp"
@@ -45,10 +45,7 @@ void add_record(const OutputArguments& arguments, LiveFlight& flight, LiveSystem
 
 /// It also wants to see the frontend's frames.
 void add_files(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, Troubles& troubles) {
-  std::error_code error;
-  std::filesystem::create_directories(arguments.out, error);
-  if (error)
-    return go_on_without("files", {ErrorCode::unwritable, fmt::format("{}: {}", arguments.out, error.message())}, live, troubles);
+  if (Result<void> made = make_folders(arguments.out); !made) return go_on_without("files", made.error(), live, troubles);
   auto files = LiveFiles::create(arguments.out, flight.map.wanted(), flight.map.load.empty());
   if (!files) return go_on_without("files", files.error(), live, troubles);
   live.on_tracked_frame([to = files->get()](const TrackedFrame& frame) { to->add(frame); });
@@ -112,6 +109,8 @@ Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, L
   for (const std::string& address : arguments.mavlink) {
     auto sink = MavlinkSink::create(address, flight.config.live.mavlink);
     if (!sink) return sink.error();
+    if (flight.config.live.mavlink.sensors.any())
+      (*sink)->on_reading([&live](const AidingSample& reading) { live.push_of_host(reading); });
     live.add_sink(*std::move(sink));
   }
   if (!arguments.out.empty()) add_files(arguments, flight, live, troubles);

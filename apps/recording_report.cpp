@@ -91,6 +91,8 @@ Json describe(const Dataset& data) {
                      {"gyro_random_walk_radps2_rthz", rig.imu_noise.gyro_random_walk_radps2_rthz},
                      {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz},
                      {"axes", axes_json(rig.imu_noise.axes)}};
+  for (const AidingCount& sensor : info.aiding)
+    json["aiding"][sensor.name] = Json{{"readings", sensor.readings}, {"rate_hz", sensor.rate_hz}};
   json["left"] = camera_json(rig, 0, info.left);
   if (rig.has_right()) json["right"] = camera_json(rig, 1, info.right);
   if (!rig.more.empty()) json["more"] = more_json(rig, info.more);

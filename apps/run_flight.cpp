@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <filesystem>
 
 #include "apps/imu_state.hpp"
 #include "fbvins/checkup/first_seconds.hpp"
-#include "fbvins/config/config_file.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/features/booster.hpp"
 #include "fbvins/pipeline/system.hpp"
@@ -124,15 +122,11 @@ RunSummary summarise(const Flight& flight, const Dataset& data, const Config& co
 
 Result<void> write_flight(const Flight& flight, const RunSummary& summary, const Config& config,
                           const std::vector<TrajectoryPoint>& truth, const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
+  if (Result<void> made = make_folders(folder); !made) return made;
   if (Result<void> done = write_run(flight.run, folder); !done) return done;
   if (flight.map)
     if (Result<void> done = write_map_record(*flight.map, folder); !done) return done;
-  if (Result<void> done = write_file_atomically(folder + "/config.yaml", to_yaml(config)); !done) return done;
-  if (Result<void> done = write_file_atomically(folder + "/summary.json", to_json_text(summary)); !done) return done;
-  if (Result<void> done = write_file_atomically(folder + "/summary.txt", to_text(summary)); !done) return done;
+  if (Result<void> done = write_summary(summary, config, folder); !done) return done;
   return truth.empty() ? Result<void>{} : write_truth(flight.run.images(), truth, folder);
 }
 

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <map>
 
+#include "fbvins/config/config_file.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/no_pose.hpp"
 
 namespace fbvins::app {
@@ -144,9 +146,7 @@ std::string label_of(const Health& health) {
   return fmt::format("{}/{}", to_string(health.state), to_string(health.reason));
 }
 
-double time_offset_found_s(const RunRecord& record) {
-  return record.odometry.empty() ? 0 : record.odometry.back().time_offset_s;
-}
+double time_offset_found_s(const RunRecord& record) { return record.odometry.empty() ? 0 : record.odometry.back().time_offset_s; }
 
 Trajectory<W> truth_of(const Dataset& data, double found_s) {
   const Duration offset = Duration::from_seconds(data.rig().time_offset_s + found_s);
@@ -260,6 +260,11 @@ std::string to_text(const RunSummary& s) {
                         s.map->mean_ms, s.map->finish_ms, s.map->adjust_ms / 1000);
   text += fmt::format("wall {:.1f} s ({}), peak memory {:.0f} MB\n", s.wall_s, s.mode, s.peak_memory_mb);
   return text;
+}
+
+Result<void> write_summary(const RunSummary& summary, const Config& config, const std::string& folder) {
+  return write_files(
+      folder, {{"config.yaml", to_yaml(config)}, {"summary.json", to_json_text(summary)}, {"summary.txt", to_text(summary)}});
 }
 
 }  // namespace fbvins::app

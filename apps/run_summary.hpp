@@ -10,6 +10,7 @@
 #include "apps/evaluation_report.hpp"
 #include "apps/run_map.hpp"
 #include "apps/run_output.hpp"
+#include "fbvins/config/config.hpp"
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins::app {
@@ -59,5 +60,7 @@ RunSummary summarise(const RunRecord& record, const Dataset& data);
 RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Trajectory<W>& truth);
 std::string to_json_text(const RunSummary& summary);
 std::string to_text(const RunSummary& summary);
+/// config.yaml, summary.json, summary.txt.
+Result<void> write_summary(const RunSummary& summary, const Config& config, const std::string& folder);
 
 }  // namespace fbvins::app

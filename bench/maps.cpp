@@ -16,7 +16,6 @@
 #include <string>
 #include <vector>
 
-#include "bench/changed_rooms.hpp"
 #include "bench/room_days.hpp"
 #include "fbvins/config/config.hpp"
 #include "fbvins/eval/alignment.hpp"
@@ -24,7 +23,9 @@
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
+#include "fbvins/sim/still_room.hpp"
 
 using namespace fbvins;
 
@@ -151,6 +152,19 @@ void days(const Arguments& a, const Vocabulary& vocabulary) {
   fmt::print("\n{} of {} starts found within {} s\n", in_time, starts, kInTime_s);
 }
 
+struct SeenView {
+  Pose<W, B> T_WB;
+  Place place;
+};
+std::vector<SeenView> look(const StillRoom& still, const Vocabulary& vocabulary) {
+  PlaceExtractor extractor(still.rig(), {}, vocabulary);
+  std::vector<SeenView> seen;
+  const std::vector<RenderedFrame> frames = still.render(still.views(), {});
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    seen.push_back({still.views()[i], extractor.extract(frames[i].frame, still.views()[i].R())});
+  return seen;
+}
+
 struct StrangeRoom {
   std::vector<SeenView> views;
   PlaceMap map;
@@ -170,14 +184,13 @@ std::pair<bool, bool> try_in(const StereoRig& rig, const Vocabulary& vocabulary,
   LoopCloser closer(rig, {}, vocabulary, map);
   bool found = false;
   for (std::size_t i = 1; i < flown.views.size() && i / 2 < most; i += 2)
-    found = closer.process(flown.views[i].places[0], keyframe_of(flown.views[i], i)).localised || found;
+    found = closer.process(flown.views[i].place, keyframe_of(flown.views[i], i)).localised || found;
   closer.finish();
   const auto reduced = closer.reduced();
   return {found, as_saved(reduced ? *reduced : closer.map()).sessions.size() > 1};
 }
 
 void strangers(const Arguments& a, const Vocabulary& vocabulary) {
-  const std::vector<DescriptorKind> kinds = {{"raw", "", vocabulary}};
   std::vector<StrangeRoom> rooms;
   StereoRig rig = euroc_rig();
   for (int r = 0; r < a.rooms; ++r) {
@@ -186,10 +199,9 @@ void strangers(const Arguments& a, const Vocabulary& vocabulary) {
     options.camera.time_samples = a.samples;
     const auto still = StillRoom::build(options, 0.5);
     if (!still) throw std::runtime_error(still.error().message);
-    RoomLooker looker(*still, kinds);
-    StrangeRoom room{looker.see(still->views(), {}), {}};
+    StrangeRoom room{look(*still, vocabulary), {}};
     LoopCloser closer(still->rig(), {}, vocabulary);
-    for (std::size_t i = 0; i < room.views.size(); i += 2) closer.process(room.views[i].places[0], keyframe_of(room.views[i], i));
+    for (std::size_t i = 0; i < room.views.size(); i += 2) closer.process(room.views[i].place, keyframe_of(room.views[i], i));
     closer.finish();
     room.map = as_saved(closer.map());
     rooms.push_back(std::move(room));

@@ -36,10 +36,6 @@ struct Day {
   Time begin;  ///< first image
 };
 
-inline Time stamp_of(const SensorEvent& event) {
-  return std::visit([](const auto& e) { return e.t; }, event);
-}
-
 struct RoomOfDays {
   static constexpr double kLater_s =
       2;  ///< a day begins so much later on the round than the one before, or where the first began

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "fbvins/doctor/diagnose.hpp"
-#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "tests/support/setup_faults.hpp"
 
 namespace fbvins::bench {
 
@@ -34,8 +34,9 @@ inline Result<Recorded> record(const std::string& path) {
   Recorded out;
   out.rig = (*data)->rig();
   while (auto event = (*data)->next()) {
-    if (auto* sample = std::get_if<ImuSample>(&*event)) out.readings.push_back(*sample);
-    else out.frames.push_back(std::get<StereoFrame>(*event));
+    std::visit(Overloaded{[&](const ImuSample& sample) { out.readings.push_back(sample); }, [](const AidingSample&) {},
+                          [&](StereoFrame& frame) { out.frames.push_back(std::move(frame)); }},
+               *event);
   }
   for (const TrajectoryPoint& p : (*data)->ground_truth()) out.truth.push_back({p.t, p.T_WB});
   return out;

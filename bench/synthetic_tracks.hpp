@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracks as a frontend would give them of a flight through a synthetic room, without images: corners on its walls, and on moving
-// boxes, seen by both cameras with the errors that tracks have: noise, a slow drift of each, and a fast drift of some. A corner
+// Tracks as a frontend would give them of a flight through a synthetic room, without images: corners on its walls, seen
+// by both cameras with the errors that tracks have: noise, a slow drift of each, and a fast drift of some. A corner
 // that comes back into view may be re-observed if it is close to where the estimator's pose predicts it.
 // One instance for each flight; the same seed gives the same bytes.
 #pragma once
@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -21,14 +20,12 @@ namespace fbvins::bench {
 struct TrackOptions {
   int features = 150;
   bool recognise = false;
-  int movers = 0;
   double noise_px = 0.4;
   double slide_px = 0.04;     ///< drift of a track in a frame, standard deviation
   double bad_share = 0.02;    ///< share of tracks that drift ten times as fast
   double lost_share = 0.02;   ///< share of the tracks that end in a frame
   double known_share = 0.15;  ///< of the corners that could be re-observed in a frame, the share that is
   double sigma_px = 0.6;      ///< standard deviation that the estimator assumes
-  double bad_start_s = 0;     ///< time with five times as fast a drift, and a pixel of disparity error
   double lap_s = 0;           ///< the flight is flown again and again, once in this time; 0: once
   std::uint64_t seed = 1;
 };
@@ -45,32 +42,16 @@ class SyntheticTracks {
     high += Vec3(2.5, 2.5, 1.2);
     const int corners = static_cast<int>(60 * (high - low).head<2>().prod());
     for (int i = 0; i < std::clamp(corners, 2500, 9000); ++i) {
-      Corner c;
-      for (int k = 0; k < 3; ++k) c.p(k) = rng_.uniform(low(k), high(k));
+      Vec3 c;
+      for (int k = 0; k < 3; ++k) c(k) = rng_.uniform(low(k), high(k));
       if (rng_.uniform() < 0.75) {  // the others are objects in the room, near its walls
         const int axis = static_cast<int>(rng_.below(3));
-        c.p(axis) = rng_.below(2) ? low(axis) : high(axis);
+        c(axis) = rng_.below(2) ? low(axis) : high(axis);
       } else {
         const int axis = static_cast<int>(rng_.below(2));
-        c.p(axis) = rng_.below(2) ? low(axis) + rng_.uniform(0, 1.5) : high(axis) - rng_.uniform(0, 1.5);
+        c(axis) = rng_.below(2) ? low(axis) + rng_.uniform(0, 1.5) : high(axis) - rng_.uniform(0, 1.5);
       }
       corners_.push_back(c);
-    }
-    for (int m = 0; m < o_.movers; ++m) {
-      Mover mover;
-      for (int k = 0; k < 3; ++k) mover.centre(k) = rng_.uniform(low(k) + 0.8, high(k) - 0.8);
-      const double heading = rng_.uniform(0, 2 * std::numbers::pi);
-      mover.along = rng_.uniform(0.5, 1.8) * Vec3(std::cos(heading), std::sin(heading), 0);
-      mover.rate = rng_.uniform(0.3, 0.9);
-      mover.phase = rng_.uniform(0, 6.28);
-      movers_.push_back(mover);
-      for (int i = 0; i < 50; ++i) {
-        Corner c;
-        c.mover = m;
-        for (int k = 0; k < 3; ++k) c.p(k) = rng_.uniform(-kHalf_m, kHalf_m);
-        c.p(static_cast<int>(rng_.below(3))) = rng_.below(2) ? kHalf_m : -kHalf_m;
-        corners_.push_back(c);
-      }
     }
   }
 
@@ -79,19 +60,12 @@ class SyntheticTracks {
     if (located_.size() > 4 * corners_.size()) forget_ended_tracks();
   }
 
-  /// The k-th image; in order. `prior` is the estimator's, of some image before.
-  TrackedFrame frame(std::size_t k, const StatePrior& prior) {
-    TrackedFrame out = frame_at(FrameId{static_cast<std::int64_t>(k)}, flight_.frames[k], prior);
-    if (k > 0) out.imu = readings(flight_.frames[k - 1], out.t);
-    return out;
-  }
-
   /// No track goes on.
   void lose_all() {
     for (auto& [corner, track] : tracks_) track.followed = false;
   }
 
-  /// The same at any stamp, in order, without IMU readings; the right image taken at `right_t`.
+  /// At any stamp, in order, without IMU readings; the right image taken at `right_t`. `prior` is the estimator's, of some image before.
   TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior) { return frame_at(id, t, prior, t); }
   TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior, Time right_t) {
     TrackedFrame out;
@@ -108,7 +82,7 @@ class SyntheticTracks {
     }
     motion_px_.clear();
     const Pose<W, B> right_T_WB = right_t == t ? T_WB : pose((right_t - flight_.start).seconds());
-    see({t_s, T_WB.p, (T_WB * flight_.rig.T_BC0).inverse(), (right_T_WB * flight_.rig.T_BC1).inverse()},
+    see({T_WB.p, (T_WB * flight_.rig.T_BC0).inverse(), (right_T_WB * flight_.rig.T_BC1).inverse()},
         prior.valid ? &drift : nullptr, out);
     std::sort(motion_px_.begin(), motion_px_.end());
     if (!motion_px_.empty()) out.stats.median_motion_px = motion_px_[motion_px_.size() / 2];
@@ -116,15 +90,6 @@ class SyntheticTracks {
   }
 
  private:
-  static constexpr double kHalf_m = 0.35;
-  struct Corner {
-    Vec3 p = Vec3::Zero();
-    int mover = -1;
-  };
-  struct Mover {
-    Vec3 centre, along;
-    double rate, phase;
-  };
   struct Track {
     TrackId id;
     Vec2 slide = Vec2::Zero(), step = Vec2::Zero();
@@ -142,38 +107,6 @@ class SyntheticTracks {
     for (const auto& [corner, track] : tracks_)
       if (const auto known = located_.find(track.id); known != located_.end()) kept.insert(*known);
     located_ = std::move(kept);
-  }
-
-  ImuSegment readings(Time from, Time to) {
-    ImuSegment out;
-    const std::vector<ImuSample>& all = flight_.imu.samples;
-    const auto at = [&](Time t) {
-      auto next = std::lower_bound(all.begin() + 1, all.end() - 1, t, [](const ImuSample& s, Time x) { return s.t < x; });
-      const ImuSample &a = *(next - 1), &b = *next;
-      const double u = (t - a.t).seconds() / (b.t - a.t).seconds();
-      return ImuSample{t, Vec3((1 - u) * a.gyro_radps + u * b.gyro_radps), Vec3((1 - u) * a.accel_mps2 + u * b.accel_mps2)};
-    };
-    out.samples.push_back(at(from));
-    for (auto s = std::upper_bound(all.begin(), all.end(), from, [](Time x, const ImuSample&a) { return x < a.t; });
-         s != all.end() && s->t < to; ++s)
-      out.samples.push_back(*s);
-    out.samples.push_back(at(to));
-    return out;
-  }
-
-  Vec3 position(const Corner& c, double t_s) const {
-    if (c.mover < 0) return c.p;
-    const Mover& m = movers_[static_cast<std::size_t>(c.mover)];
-    return m.centre + std::sin(m.rate * t_s + m.phase) * m.along + c.p;
-  }
-  bool hidden(const Vec3& from, const Vec3& p, double t_s, int mover) const {
-    for (std::size_t m = 0; m < movers_.size(); ++m) {
-      if (static_cast<int>(m) == mover) continue;
-      const Vec3 c = position(Corner{Vec3::Zero(), static_cast<int>(m)}, t_s) - from, ray = p - from;
-      const double along = c.dot(ray) / ray.squaredNorm();
-      if (along > 0 && along < 1 && (c - along * ray).norm() < kHalf_m) return true;
-    }
-    return false;
   }
 
   std::optional<Observation> observe(const Camera& camera, const Vec3& p_C, const Vec2& slide) {
@@ -204,7 +137,6 @@ class SyntheticTracks {
 
   /// One instant of the cameras.
   struct Instant {
-    double t_s;
     Vec3 body_W;
     Pose<C0, W> T_C0W;
     Pose<C1, W> T_C1W;
@@ -215,8 +147,7 @@ class SyntheticTracks {
     f.id = track.id;
     f.age_frames = track.age;
     f.left = left;
-    const Vec2 squint(now.t_s < o_.bad_start_s ? 1.0 : 0.0, 0);
-    if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right, now.T_C1W * p_W, track.slide + squint);
+    if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right, now.T_C1W * p_W, track.slide);
     out.stats.tracked += track.age > 0;
     out.stats.stereo += f.right.has_value();
     if (track.age > 0) motion_px_.push_back((left.pixel - track.seen_at).norm());
@@ -227,14 +158,13 @@ class SyntheticTracks {
     out.features.push_back(f);
   }
 
-  bool in_view(const Corner& corner, const Vec3& p_W, const Instant& now) const {
+  bool in_view(const Vec3& p_W, const Instant& now) const {
     const Vec3 p_C = now.T_C0W * p_W;
-    return p_C.z() >= 0.3 && p_C.z() <= 30 && std::abs(p_C.x()) <= p_C.z() && std::abs(p_C.y()) <= 0.7 * p_C.z() &&
-           !hidden(now.body_W, p_W, now.t_s, corner.mover);
+    return p_C.z() >= 0.3 && p_C.z() <= 30 && std::abs(p_C.x()) <= p_C.z() && std::abs(p_C.y()) <= 0.7 * p_C.z();
   }
 
   void follow(Track& track, const Vec3& p_W, const Instant& now, TrackedFrame& out) {
-    track.slide += track.step + (now.t_s < o_.bad_start_s ? 5 : 1) * o_.slide_px * Vec2(rng_.normal(), rng_.normal());
+    track.slide += track.step + o_.slide_px * Vec2(rng_.normal(), rng_.normal());
     const auto left = observe(flight_.rig.left, now.T_C0W * p_W, track.slide);
     if (left && track.slide.norm() < 8) add(track, *left, p_W, now, out);
     else track.followed = false;
@@ -257,7 +187,7 @@ class SyntheticTracks {
       const std::size_t i = corners[n];
       corners[n] = corners.back();
       corners.pop_back();
-      const Vec3 p_W = position(corners_[i], now.t_s);
+      const Vec3 p_W = corners_[i];
       const auto left = observe(flight_.rig.left, now.T_C0W * p_W, Vec2::Zero());
       if (!left) continue;
       Track track;
@@ -270,10 +200,10 @@ class SyntheticTracks {
   void see(const Instant& now, const Pose<G, W>* drift, TrackedFrame& out) {
     std::vector<std::size_t> fresh;
     for (std::size_t i = 0; i < corners_.size(); ++i) {
-      const Vec3 p_W = position(corners_[i], now.t_s);
+      const Vec3 p_W = corners_[i];
       const auto it = tracks_.find(i);
       const bool followed = it != tracks_.end() && it->second.followed;
-      if (!in_view(corners_[i], p_W, now)) {
+      if (!in_view(p_W, now)) {
         if (followed) it->second.followed = false;
         continue;
       }
@@ -292,8 +222,7 @@ class SyntheticTracks {
   const Simulation& flight_;
   TrackOptions o_;
   Rng rng_;
-  std::vector<Corner> corners_;
-  std::vector<Mover> movers_;
+  std::vector<Vec3> corners_;
   std::map<std::size_t, Track> tracks_;  // of each corner, the last
   std::map<TrackId, Vec3> located_;
   std::vector<double> motion_px_;

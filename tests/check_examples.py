@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Checks the examples at the beginning of headers (comment lines indented by three spaces): each function, member and type that they
-name is declared in some header.
+name is declared in some header, of the tests' support, too.
 
 usage: check_examples.py [REPOSITORY]      exit 1, and one line for each name that is no header declares
 """
@@ -19,7 +19,7 @@ OPEN = {"use", "print", "offer", "plot", "for_rig", "fly_with", "chosen_by", "sl
         "MyFactor"}
 STANDARD = {"begin", "end", "size", "empty", "front", "back", "get", "reset", "value", "value_or", "has_value", "data", "push_back",
             "first", "second", "find", "c_str", "str", "norm", "transpose", "inverse", "x", "y", "z", "w", "resize", "at", "count",
-            "load", "store", "join", "wait", "lock", "what", "png"}
+            "load", "ldlt", "store", "join", "wait", "lock", "what", "png"}
 
 
 def example_of(text):
@@ -41,7 +41,7 @@ def words_of(path):
 
 def faults(root):
     headers = [path for folder in FOLDERS for path in sorted((root / folder / "fbvins").rglob("*.hpp"))]
-    known = set().union(*(words_of(path) for path in headers))
+    known = set().union(*(words_of(path) for path in headers + sorted((root / "tests/support").glob("*.hpp"))))
     for path in headers:
         example = example_of(path.read_text(encoding="utf-8"))
         own = set(re.findall(r"\b(?:auto|struct|[A-Z]\w*(?:<[^>]*>)?|int|double)\s+&?\*?([A-Za-z_]\w*)\s*[({=;]", example))

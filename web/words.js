@@ -25,6 +25,8 @@ const REASONS = {
   imu_vibration: "strong vibration spoils the IMU's readings",
   correction_pending: "the pose is being corrected",
   range_disagrees: "the rangefinder disagrees: it is not used",
+  velocity_disagrees: "the sensor of velocity disagrees: it is not used",
+  pressure_disagrees: "the barometer disagrees: it is not used",
 };
 
 export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }

@@ -21,7 +21,8 @@ import numpy
 
 from . import _fbvins
 from ._fbvins import (Camera, Config, DepthSensor, ErrorStatistics, Evaluation, Features, ImuNoise, ImuSample, MapContents, MapUpdate, Odometry,
-                      Recording, Rig, SensorPacket, StatePrior, StereoFrame, Trajectory, __version__, orb, register_frontend, simulation_presets)
+                      PressureSample, RangeSample, Recording, Rig,
+                      SensorPacket, StatePrior, StereoFrame, Trajectory, VelocitySample, __version__, orb, register_frontend, simulation_presets)
 from ._fbvins import Booster
 from . import calibration
 from ._run import Run
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
     AnyTrajectory = Union[Trajectory, Run, PathLike, Tuple["numpy.ndarray", "numpy.ndarray", "numpy.ndarray"]]
 
 __all__ = ["Booster", "Camera", "Config", "DepthSensor", "Diagnosis", "ErrorStatistics", "Finding", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
-           "MapUpdate", "Odometry", "Recording", "Rig", "Run", "SensorPacket", "StatePrior", "StereoFrame", "System", "Trajectory", "__version__", "boost",
+           "MapUpdate", "Odometry", "PressureSample", "RangeSample", "Recording", "Rig", "Run",
+           "SensorPacket", "StatePrior", "StereoFrame", "System", "Trajectory", "VelocitySample", "__version__", "boost",
            "calibration", "config", "convert", "doctor", "evaluate", "info", "load_map", "open", "orb", "register_frontend", "report", "run", "simulate", "simulation_presets"]
 
 

@@ -40,7 +40,10 @@ nb::object next(Dataset& data) {
     return data.next();
   }();
   if (!event) throw nb::stop_iteration();
-  return std::visit([](auto&& value) { return nb::cast(std::forward<decltype(value)>(value)); }, std::move(*event));
+  return std::visit(
+      Overloaded{[](AidingSample&& reading) { return std::visit([](auto&& r) { return nb::cast(r); }, std::move(reading)); },
+                 [](auto&& value) { return nb::cast(std::forward<decltype(value)>(value)); }},
+      std::move(*event));
 }
 
 PyTrajectory truth_of(const Dataset& data) {
@@ -103,7 +106,8 @@ void bind_measurements(nb::module_& m) {
 
 void bind_dataset(nb::module_& m) {
   nb::class_<Dataset>(m, "Recording",
-                      "A stereo-inertial recording, or a simulation: an iterator of ImuSample and StereoFrame in order of time. "
+                      "A stereo-inertial recording, or a simulation: an iterator of ImuSample, StereoFrame and readings of other sensors in order "
+                      "of time. "
                       "It can be iterated once: ValueError when it is begun again after its end.",
                       nb::dynamic_attr())
       .def_prop_ro("rig", &Dataset::rig, "the calibration")
@@ -126,7 +130,7 @@ void bind_dataset(nb::module_& m) {
             return nb::borrow(self);
           },
           nb::sig("def __iter__(self) -> Recording"))
-      .def("__next__", &next, nb::sig("def __next__(self) -> ImuSample | StereoFrame"))
+      .def("__next__", &next, nb::sig("def __next__(self) -> ImuSample | StereoFrame | RangeSample | VelocitySample | PressureSample"))
       .def("__repr__", [](const Dataset& d) {
         return fmt::format("<fbvins.Recording {} ({}), {} frames>", d.info().name, d.info().format, d.frames().size());
       });

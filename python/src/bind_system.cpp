@@ -318,9 +318,15 @@ void bind_system(nb::module_& m) {
           "Arrays in C order are not copied, and other threads read them later: pass new arrays, do not "
           "write to them afterwards. ValueError for stamps that do not increase.")
       .def(
-          "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")
+          "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording, or a reading of your sensor; before the images that follow it.")
       .def(
           "push", [](PySystem& s, const StereoFrame& frame) { s.push(frame); }, "event"_a)
+      .def(
+          "push", [](PySystem& s, const RangeSample& reading) { s.push(reading); }, "event"_a)
+      .def(
+          "push", [](PySystem& s, const VelocitySample& reading) { s.push(reading); }, "event"_a)
+      .def(
+          "push", [](PySystem& s, const PressureSample& reading) { s.push(reading); }, "event"_a)
       .def("finish", &PySystem::finish,
            "Processes all waiting events and ends; afterwards only results already waiting for poll() are left.")
       .def("poll", &PySystem::poll, "The Odometry of all images processed since the last call; empty with on_odometry.")

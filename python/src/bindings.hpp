@@ -17,6 +17,7 @@ using namespace nanobind::literals;  // NOLINT: "name"_a of nanobind's
 
 void bind_rig(nb::module_& m);
 void bind_config(nb::module_& m);
+void bind_aiding(nb::module_& m);
 void bind_recording(nb::module_& m);
 void bind_trajectory(nb::module_& m);
 void bind_frontend(nb::module_& m);

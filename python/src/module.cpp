@@ -8,6 +8,7 @@ NB_MODULE(_fbvins, m) {
   m.attr("__version__") = FBVINS_VERSION;
   bind_rig(m);
   bind_config(m);
+  bind_aiding(m);
   bind_recording(m);
   bind_trajectory(m);
   bind_frontend(m);

@@ -49,11 +49,16 @@ inline std::string images_left_out(const char* name, const CameraInfo& c) {
   return out;
 }
 
-/// Reads to the end: "frames/left/right images/IMU samples delivered; what was left out".
+/// Reads to the end: "frames/left/right images/IMU samples[/readings of other sensors] delivered; what was left out".
 inline std::string deliver(Dataset& data) {
-  int frames = 0, left = 0, right = 0, imu = 0;
+  int frames = 0, left = 0, right = 0, imu = 0, aiding = 0;
   Time last_imu{-1}, last_image{-1};
   while (auto event = data.next()) {
+    if (const auto* reading = std::get_if<AidingSample>(&*event)) {
+      EXPECT_EQ(impossible(*reading), "");
+      ++aiding;
+      continue;
+    }
     if (const auto* sample = std::get_if<ImuSample>(&*event)) {
       EXPECT_GT(sample->t, last_imu);
       EXPECT_TRUE(sample->gyro_radps.allFinite() && sample->accel_mps2.allFinite());
@@ -75,7 +80,7 @@ inline std::string deliver(Dataset& data) {
   }
   EXPECT_FALSE(data.next()) << "the end stays the end";
   const DatasetInfo& info = data.info();
-  return fmt::format("{}/{}/{}/{}", frames, left, right, imu) + rows_left_out("left", info.left.rows) +
+  return fmt::format("{}/{}/{}/{}", frames, left, right, imu) + (aiding > 0 ? fmt::format("/{}", aiding) : "") + rows_left_out("left", info.left.rows) +
          rows_left_out("right", info.right.rows) + rows_left_out("imu", info.imu_rows) +
          rows_left_out("truth", info.ground_truth_rows) + images_left_out("left", info.left) +
          images_left_out("right", info.right) +

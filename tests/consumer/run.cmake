@@ -65,6 +65,15 @@ if(error_m GREATER 0.05 OR coverage LESS 0.7)
 endif()
 message(STATUS "blocks: ${error_m} m, coverage ${coverage}")
 
+# A factor of a sensor that the library does not know (examples/own_factor).
+step(${CMAKE_COMMAND} -S ${EXAMPLES}/own_factor -B ${folder}/own_factor -G Ninja -DCMAKE_CXX_COMPILER=${CXX} ${installed})
+step(${CMAKE_COMMAND} --build ${folder}/own_factor)
+execute_process(COMMAND ${folder}/own_factor/own_factor ${folder}/flight 1.08 RESULT_VARIABLE result OUTPUT_VARIABLE said)
+if(NOT result EQUAL 0 OR NOT said MATCHES "^[1-9][0-9]+ poses, [1-9][0-9]+ readings used, [0-9]+ left out, scale 1\\.0[5-9]")
+  message(FATAL_ERROR "examples/own_factor: ${result}\n${said}")
+endif()
+message(STATUS "own_factor: ${said}")
+
 # Recordings and maps, by the lines of the tutorial.
 build(recording)
 step(${folder}/recording/consumer ${folder}/flight ${folder}/flat.fbm)

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/doctor/common_mistakes.hpp"
-#include "fbvins/faults/setup_faults.hpp"
+#include "tests/support/setup_faults.hpp"
 #include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {

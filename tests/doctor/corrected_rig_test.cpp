@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "fbvins/doctor/corrected_rig.hpp"
-#include "fbvins/faults/setup_faults.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "tests/support/rendered_recording.hpp"
+#include "tests/support/setup_faults.hpp"
 
 namespace fbvins {
 namespace corrected_rig_test {

@@ -8,7 +8,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/faults/setup_faults.hpp"
+#include "fbvins/core/angle.hpp"
+#include "tests/support/setup_faults.hpp"
 #include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
@@ -245,6 +246,40 @@ void expect_named(const Evidence& evidence, FindingKind kind, double size, doubl
   ASSERT_NE(finding, nullptr) << all_of(diagnosis);
   EXPECT_EQ(diagnosis.findings.size(), 1u) << all_of(diagnosis);
   EXPECT_NEAR(finding->size, size, tolerance) << all_of(diagnosis);
+}
+
+TEST(Doctor, MeasuresTheDirectionOfTheBaseline) {
+  Evidence evidence = good();
+  const Vec3 left = evidence.rig.T_BC0.p, true_right = evidence.rig.T_BC1.p;
+  evidence.rig.T_BC1.p = left + so3_exp(Vec3(4 * kDegree, 0, 0)) * (true_right - left);
+  expect_named(evidence, FindingKind::baseline_direction, 4, 0.4);
+  const StereoRig corrected = examine(evidence).rig;
+  EXPECT_LT((corrected.T_BC1.p - true_right).norm(), 1.5e-3);
+}
+
+TEST(Doctor, SaysWhereMatchesLieFarFromTheirLinesForNoSingleReason) {
+  Evidence evidence = good();
+  for (StereoView& view : evidence.stereo)
+    for (StereoPoint& point : view.points) point.right.y() += 5 * std::sin(point.right.x() / 30);
+  const Diagnosis diagnosis = examine(evidence);
+  const Finding* finding = find(diagnosis, FindingKind::epipolar_error);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_GT(finding->size, 1.5);
+  EXPECT_LT(finding->size, 5);
+  EXPECT_TRUE(finding->fields.empty());
+}
+
+TEST(Doctor, NamesReadingsOfAnotherImu) {
+  Evidence evidence = good();
+  for (ImuSample& sample : evidence.imu) {
+    const double t = sample.t.seconds();
+    sample.gyro_radps = 0.5 * Vec3(std::sin(0.31 * t * t), std::cos(0.23 * t * t), std::sin(0.19 * t * t + 1));
+  }
+  const Diagnosis diagnosis = examine(evidence);
+  const Finding* finding = find(diagnosis, FindingKind::imu_camera_disagree);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_LT(finding->size, 0.7);
+  EXPECT_EQ(find(diagnosis, FindingKind::time_offset), nullptr) << all_of(diagnosis);
 }
 
 TEST(DoctorOfOneCamera, IsSilentWhereAllIsWell) {

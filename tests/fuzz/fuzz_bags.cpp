@@ -9,6 +9,7 @@
 #include "fbvins/bags/foreign_calibration.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
+#include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/foreign_files.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
@@ -179,6 +180,11 @@ std::vector<std::string> message_seeds() {
   std::vector<std::string> out;
   for (const int kind : {1, 2, 3, 4}) out.push_back("c" + small_message(kind, Time{1000}));
   out.push_back("c" + rectified_message());
+  for (const AidingSample& reading : {AidingSample(RangeSample{.t = Time{1000}, .distance_m = 2}), AidingSample(VelocitySample{.t = Time{1000}}),
+                                      AidingSample(PressureSample{Time{1000}, 1e5})}) {
+    out.push_back("c" + aiding_message(reading, "sensor", Encoding::cdr));
+    out.push_back("1" + aiding_message(reading, "sensor", Encoding::ros1));
+  }
   // In ROS 1's order a header begins with its number, and nothing is aligned.
   out.push_back("1" + std::string(400, '\0'));
   return out;
@@ -190,6 +196,8 @@ void fuzz_message(std::string_view bytes) {
   const Encoding encoding = bytes[0] == '1' ? Encoding::ros1 : Encoding::cdr;
   bytes.remove_prefix(1);
   if (const auto sample = imu_of(bytes, encoding)) require(sample->gyro_radps.allFinite() && sample->accel_mps2.allFinite());
+  for (const AidingSample& kind : {AidingSample(RangeSample{}), AidingSample(VelocitySample{}), AidingSample(PressureSample{})})
+    if (const auto read = aiding_of(bytes, encoding, aiding_type(kind))) require(impossible(read->reading).empty());
   stamp_of(bytes, encoding);
   for (const bool compressed : {false, true}) require_sentence(image_of(bytes, encoding, compressed));
   const auto camera = camera_of(bytes, encoding);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A flight controller's bytes, as a fuzz target: the decoder with and without signing, its readings, its clock.
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/live/mavlink_imu.hpp"
 #include "fbvins/live/mavlink_session.hpp"
@@ -54,10 +53,16 @@ void append_message(std::string& out, const MavlinkMessage& message) {
       message);
 }
 
+MavlinkOptions with_sensors() {
+  MavlinkOptions options;
+  options.sensors.range = options.sensors.flow = options.sensors.pressure = true;
+  return options;
+}
+
 /// The companion, with the requirements that its answers fulfil.
 struct Companion {
   MavlinkImu imu;
-  MavlinkSession session{{}};
+  MavlinkSession session{with_sensors()};
   MavlinkKey key{};
   MavlinkSigner signer{key, 0};
   MavlinkDecoder plain, wants_signed{&signer};
@@ -69,6 +74,7 @@ struct Companion {
       newest = sample.t;
     }
     require_frames(session.receive(packet, now));
+    for (const AidingSample& reading : session.take_readings()) require(impossible(reading).empty());
     LivePose pose;
     pose.host_t = now;
     pose.health = {HealthState::good, HealthReason::none};
@@ -110,6 +116,15 @@ std::vector<std::string> mavlink_seeds() {
       fine.time_usec = static_cast<std::uint64_t>(theirs_ns / 1000), fine.acc = {0, 0, -9.8f}, fine.fields_updated = 0x3f;
       ScaledImuMessage coarse;
       coarse.time_boot_ms = static_cast<std::uint32_t>(theirs_ns / 1'000'000);
+      DistanceSensorMessage distance;
+      distance.time_boot_ms = coarse.time_boot_ms, distance.max_distance = 800, distance.current_distance = 150;
+      append_message(packets, distance);
+      OpticalFlowRadMessage flow;
+      flow.time_usec = fine.time_usec, flow.integration_time_us = 20'000, flow.distance = 1.5f, flow.quality = 200;
+      append_message(packets, flow);
+      ScaledPressureMessage pressure;
+      pressure.time_boot_ms = coarse.time_boot_ms, pressure.press_abs = 1010;
+      append_message(packets, pressure);
       if (ahead_ns < 10'000'000'000) append_message(packets, fine);
       else append_message(packets, coarse);
       // The companion hears each packet at a time of its own, as in fuzz_mavlink.

@@ -56,6 +56,7 @@ void check(const SocketFrame& frame) {
 }
 
 void check(const SocketPosition& position) { require(!position.anchor || impossible(*position.anchor).empty()); }
+void check(const SocketAiding& aiding) { require(!aiding.reading || impossible(*aiding.reading).empty()); }
 void check(const SocketDevice& device) {
   for (const SensorFinding& finding : device_findings(device.facts, *parse_socket_rig(seed_rig(), 64, 48)))
     require(!finding.text.empty() && finding.text.find('\n') == std::string::npos);
@@ -95,6 +96,8 @@ std::vector<std::string> socket_seeds() {
       bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
       bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT, {}}),
       bytes_of(FBVINS_SOCKET_POSITION, FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),
+      bytes_of(FBVINS_SOCKET_AIDING, socket_aiding(VelocitySample{.t = Time{42}})),
+      bytes_of(FBVINS_SOCKET_AIDING, socket_aiding(RangeSample{.t = Time{42}, .distance_m = 2})),
       bytes_of(FBVINS_SOCKET_DEVICE, FbvinsSocketDevice{{}, "firmware=5.13.0.50\nusb=2.1\nexposure_ms=4\nstalls=1\n"}),
       bytes_of(FBVINS_SOCKET_GOODBYE, FbvinsSocketGoodbye{{}, FBVINS_SOCKET_DONE, 0, "done"})};
 }

@@ -5,6 +5,7 @@
 #include "fbvins/features/safetensors.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/csv.hpp"
+#include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -50,6 +51,13 @@ std::vector<std::string> calibration_seeds() {
       files.at("cam1/sensor.yaml"), files.at("imu0/sensor.yaml"),
       files.at("cam0/sensor.yaml") + "mask: m.png\nmask_rectangles: [[0, 0, 9, 9], [60, 40, 9, 9]]\nmask_circles: [[30, 9, 5]]\n",
       "cam0:\n" + camera + "cam1:\n  T_cn_cnm1: &a [1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n" + camera.substr(80)};
+}
+
+std::vector<std::string> aiding_seeds() {
+  return {"T_BS:\n  cols: 4\n  rows: 4\n  data: [0, 0, 1, 0.02, 0, 1, 0, 0, -1, 0, 0, -0.03, 0, 0, 0, 1]\nnoise_m: 0.02\nnearest_m: 0.1\n"
+          "farthest_m: 40\nnoise_mps: [0.1, 0.1, 100]\nnoise_pa: 2\n",
+          "#timestamp [ns],distance [m]\n1000,1.5\n2000,inf\n3000,1.4\n", "1000,1,2,3\n2000,1,2,3,0.1,0.1,100\n",
+          "1000,100000\n2000,100001\n"};
 }
 
 std::vector<std::string> trajectory_seeds() {
@@ -197,6 +205,20 @@ void fuzz_calibration(std::string_view bytes) {
   require_sentence(parse_imu(yaml));
 }
 
+/// The bytes as each kind's sensor.yaml and as its data.csv, each beside a good other file.
+void fuzz_aiding(std::string_view bytes) {
+  const std::string text(bytes), yaml = aiding_seeds()[0];
+  for (const AidingFolder& folder : aiding_folders())
+    for (const auto& [sensor, csv] : {std::pair{text, std::string("1,100000\n")}, {text, std::string("1,2,3,4\n")}, {yaml, text}}) {
+      std::vector<std::string> warnings;
+      const auto readings = folder.parse({YamlReader("sensor.yaml", sensor), csv, "data.csv", {}}, warnings);
+      require_sentence(readings);
+      if (!readings) continue;
+      for (const AidingSample& reading : *readings) require(impossible(reading).empty());
+      for (std::size_t i = 1; i < readings->size(); ++i) require(stamp_of((*readings)[i - 1]) < stamp_of((*readings)[i]));
+    }
+}
+
 void fuzz_trajectory(std::string_view bytes) {
   const auto file = parse_trajectory(bytes, "t.txt");
   require_sentence(file);
@@ -274,6 +296,7 @@ const std::vector<Target>& targets() {
       {"csv", fuzz_csv, csv_seeds},
       {"calibration", fuzz_calibration, calibration_seeds},
       {"trajectory", fuzz_trajectory, trajectory_seeds},
+      {"aiding", fuzz_aiding, aiding_seeds},
       {"image", fuzz_image, image_seeds},
       {"weights", fuzz_weights, weights_seeds},
       {"mcap", fuzz_mcap, mcap_seeds},

@@ -12,6 +12,7 @@ namespace fbvins::fuzz {
 void fuzz_csv(std::string_view bytes);
 void fuzz_calibration(std::string_view bytes);
 void fuzz_trajectory(std::string_view bytes);
+void fuzz_aiding(std::string_view bytes);
 void fuzz_image(std::string_view bytes);
 void fuzz_weights(std::string_view bytes);
 void fuzz_mcap(std::string_view bytes);

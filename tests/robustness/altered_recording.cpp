@@ -86,7 +86,7 @@ Flown fly(const std::filesystem::path& recording, const SystemOptions& config, c
   if (!system) throw std::runtime_error(system.error().message);
   system->on_odometry([&](const Odometry& o) { flown.odometry.push_back(o); });
   while (auto event = (*data)->next()) {
-    const Time t = std::visit([](const auto& e) { return e.t; }, *event);
+    const Time t = stamp_of(*event);
     if (alter && !alter((t - flown.start).seconds(), *event)) continue;
     if (!system->push(std::move(*event))) break;
   }

@@ -53,7 +53,7 @@ sensor_msgs::msg::Image message_of(const Image& image, Time t, std::uint32_t pad
 }
 
 Time time_of(const SensorEvent& event) {
-  return std::visit([](const auto& e) { return e.t; }, event);
+  return stamp_of(event);
 }
 
 void publish(const SensorEvent& event) {

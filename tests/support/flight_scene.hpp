@@ -3,14 +3,12 @@
 // and where the cameras see the points of a room. Pure functions; fixed seeds.
 #pragma once
 
-#include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "fbvins/calibration/flight_rig.hpp"
 #include "fbvins/calibration/flight_tracks.hpp"
 #include "fbvins/calibration/flight_view_term.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins::test {
 

@@ -2,8 +2,8 @@
 // For tests: half a second of the motion with known biases, and its readings integrated.
 #pragma once
 
-#include "fbvins/imu/imu_test_motion.hpp"
 #include "fbvins/imu/preintegration.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins::test {
 

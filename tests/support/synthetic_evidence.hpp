@@ -3,11 +3,9 @@
 // closed form.
 #pragma once
 
-#include <cmath>
-
 #include "fbvins/core/rng.hpp"
 #include "fbvins/doctor/evidence.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins::test {
 

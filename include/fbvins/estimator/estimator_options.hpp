@@ -31,14 +31,12 @@ struct KeyframeOptions {
 
 struct KnownLandmarkOptions {
   bool enabled = true;
-  int capacity = 20000;  ///< landmarks remembered
-  double position_sigma_m = 0.01;
+  int capacity = 20000;            ///< landmarks remembered
+  double position_sigma_m = 0.01;  ///< of a landmark's position, in addition to that of its triangulation; set by tests
 
   template <class V>
   void visit(V&& v) {
     v("enabled", enabled, "", "re-observed landmarks constrain the window");
-    v("position_sigma_m", position_sigma_m, "m",
-      "standard deviation of a remembered landmark's position, in addition to that of its triangulation", 1e-4, 1.0);
   }
 };
 
@@ -70,11 +68,38 @@ struct RangefinderOptions {
   }
 };
 
+/// Readings of a sensor of velocity: wheels, optical flow (docs/velocity.md).
+struct VelocityOptions {
+  bool enabled = true;
+  double slip_mps = 0.3;
+
+  template <class V>
+  void visit(V&& v) {
+    v("enabled", enabled, "", "readings of a sensor of velocity are used");
+    v("slip_mps", slip_mps, "m/s", "readings that are further off the predicted velocity, and by four standard deviations, are left out",
+      0.01, 10.0);
+  }
+};
+
+/// Readings of a barometer (docs/barometer.md).
+struct BarometerOptions {
+  bool enabled = true;
+  double drift_m_rts = 0.03;
+
+  template <class V>
+  void visit(V&& v) {
+    v("enabled", enabled, "", "readings of a barometer constrain the height");
+    v("drift_m_rts", drift_m_rts, "m/sqrt(s)", "random walk of the height that it says: weather, ventilation, its temperature", 0.001, 10.0);
+  }
+};
+
 struct EstimatorOptions {
   KeyframeOptions keyframes;
   KnownLandmarkOptions known_landmarks;
   StandingOptions standing;
   RangefinderOptions rangefinder;
+  VelocityOptions velocity;
+  BarometerOptions barometer;
   int max_iterations = 4;
   int max_landmarks = 300;
   double gravity_mps2 = 9.81;
@@ -112,6 +137,8 @@ struct EstimatorOptions {
     v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
     v.group("standing", standing, "a vehicle that stands level before it flies");
     v.group("rangefinder", rangefinder, "a beam to the floor");
+    v.group("velocity", velocity, "wheels, optical flow");
+    v.group("barometer", barometer, "height by the pressure of the air");
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);

@@ -7,7 +7,8 @@
 //   Dataset& data = **opened;
 //   while (auto event = data.next()) system.push(std::move(*event));
 //
-// Order: every IMU sample up to the first one at or after an image (stamp + time offset), the ranges up to it, then the
+// Order: every IMU sample up to the first one at or after an image (stamp + time offset), the readings of
+// aiding sensors (types/aiding.hpp) up to it, then the
 // image. After the last image the remaining samples, unless max_frames or duration_s cut the recording short. A flight record
 // comes in the order in which it was recorded.
 #pragma once
@@ -101,7 +102,7 @@ struct DatasetContents {
   std::vector<TrajectoryPoint> ground_truth;
   std::vector<ImuSample> imu;      ///< increasing stamps; in the order recorded where frames have imu_before
   std::vector<FrameEntry> frames;  ///< the same
-  std::vector<RangeSample> ranges = {};  ///< increasing stamps, on the IMU's clock
+  std::vector<AidingSample> aiding = {};  ///< increasing stamps, on the IMU's clock
   std::unique_ptr<FrameLoader> loader = {};
 };
 
@@ -133,7 +134,7 @@ class Dataset {
 
  private:
   bool imu_is_due() const;
-  std::optional<RangeSample> due_range();
+  std::optional<AidingSample> due_aiding();
   std::optional<StereoFrame> next_frame();
   void count(const LoadedFrame& loaded);
 
@@ -142,7 +143,7 @@ class Dataset {
   bool deliver_rest_ = true;  ///< IMU samples after the last image
   std::size_t next_imu_ = 0;
   std::size_t next_frame_ = 0;
-  std::size_t next_range_ = 0;
+  std::size_t next_aiding_ = 0;
   std::size_t next_clock_step_ = 0;
   bool begun_ = false, at_end_ = false;
 };

@@ -37,6 +37,13 @@ struct CameraInfo {
   ImageCounts images;  ///< among the frames that skip_frames and max_frames leave
 };
 
+/// Readings of the sensors of one kind that aid images and IMU.
+struct AidingCount {
+  std::string name;  ///< "rangefinder", "velocity", "barometer"
+  int readings = 0;
+  double rate_hz = 0;  ///< as those of images and IMU
+};
+
 struct DatasetInfo {
   std::string name;    ///< last part of the path
   std::string format;  ///< "EuRoC folder", "EuRoC zip" or "MCAP flight record"
@@ -46,6 +53,7 @@ struct DatasetInfo {
   RowCounts imu_rows, ground_truth_rows;
   int frames = 0;  ///< frames that next() will deliver, less those found without any image
   int imu_samples = 0;
+  std::vector<AidingCount> aiding = {};  ///< of those that there are
   int ground_truth_poses = 0;
   Time first_image, last_image, first_imu, last_imu;
   double image_rate_hz = 0, imu_rate_hz = 0;  ///< measured: one over the median interval

@@ -12,9 +12,9 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
-#include "fbvins/types/range.hpp"
 
 namespace fbvins {
 
@@ -32,8 +32,8 @@ class EurocFolder {
   /// A camera without an image has no row. Cameras but the right one have the frame's stamp. `depth_left_m`: row by row, 0 where
   /// nothing is; written as 16-bit PNG in millimetres to depth0.
   Result<void> add(StereoFrame frame, Time right_stamp, std::vector<float> depth_left_m = {});
-  /// Of a rangefinder, whose beam is that of the first one: to range0. To be called once at most.
-  Result<void> add_ranges(const std::vector<RangeSample>& readings);
+  /// Of aiding sensors, each to a folder of its own: range0, velocity0, baro0. To be called once at most.
+  Result<void> add_aiding(const std::vector<AidingSample>& readings);
   /// Writes readings and truth (zeros where it has no velocity or biases), and completes the recording. To be called once.
   Result<void> finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth);
 

@@ -10,6 +10,7 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 #include "fbvins/types/loop.hpp"
@@ -128,6 +129,7 @@ struct LiveMark {
 };
 
 /// Sensor events are those that the estimator consumes, in its order.
-using LiveEvent = std::variant<ImuSample, StereoFrame, Odometry, LivePose, MapUpdate, LiveStatus, LiveView, LiveMark>;
+using LiveEvent = 
+    std::variant<ImuSample, StereoFrame, AidingSample, Odometry, LivePose, MapUpdate, LiveStatus, LiveView, LiveMark>;
 
 }  // namespace fbvins

@@ -45,6 +45,9 @@ class LiveSystem {
   void on_failure(std::function<void()> callback);
 
   SensorInput& input();
+  /// A reading of an aiding sensor that is stamped on this machine's CLOCK_MONOTONIC, as a flight controller's: right to the
+  /// shortest delay of the images. Left out before the first image. From any thread.
+  void push_of_host(AidingSample reading);
   /// The estimator starts again with the next image (System::start_again). From any thread.
   void start_again();
   /// Sends a LiveMark to the sinks. From any thread.

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "fbvins/mavlink/aiding_options.hpp"
 #include "fbvins/mavlink/mounting_options.hpp"
 
 namespace fbvins {
@@ -35,6 +36,7 @@ struct MavlinkOptions {
   std::string key_file = "";
   std::string key_time_file = "mavlink_signing_time";
   MountingOptions mounting = {};
+  MavlinkAidingOptions sensors = {};
 
   template <class V>
   void visit(V&& v) {
@@ -52,6 +54,7 @@ struct MavlinkOptions {
     v("key_file", key_file, "", "file of the 32-byte key of MAVLink signing; empty: frames are not signed");
     v("key_time_file", key_time_file, "", "with a key: file that keeps the times of signatures growing over restarts");
     v.group("mounting", mounting, "the IMU on the vehicle, and the local frame");
+    v.group("sensors", sensors, "sensors of the flight controller that aid images and IMU");
   }
 };
 

@@ -10,11 +10,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "fbvins/live/mavlink_options.hpp"
 #include "fbvins/live/sink.hpp"
+#include "fbvins/types/aiding.hpp"
 
 namespace fbvins {
 
@@ -30,6 +32,7 @@ struct MavlinkLinkState {
   std::int64_t frames_refused = 0;   ///< not signed with the key
   std::int64_t packets_refused = 0;  ///< UDP packets of others than the flight controller
   int times_opened = 0;
+  std::int64_t readings = 0;  ///< of its sensors that are used
   std::string problem;  ///< one sentence while the port is not open, no poses can be sent or strangers send packets
 };
 
@@ -46,6 +49,9 @@ class MavlinkSink final : public Sink {
   std::vector<OutputFigure> figures() const override;
   Result<void> finish() override;
   MavlinkLinkState state() const;
+  /// Called on the sink's own thread with each reading of the sensors that the options name, stamped on CLOCK_MONOTONIC. From any
+  /// thread, but not from the callback.
+  void on_reading(std::function<void(const AidingSample&)> callback);
 
  private:
   struct Impl;

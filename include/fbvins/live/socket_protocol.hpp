@@ -18,7 +18,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 8,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 9,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -34,6 +34,7 @@ enum {
   FBVINS_SOCKET_POSITION = 5,  ///< sender to estimator, since version 1.1
   FBVINS_SOCKET_DEVICE = 6,    ///< sender to estimator, since version 1.4
   FBVINS_SOCKET_TAG = 7,       ///< sender to estimator, since version 1.5
+  FBVINS_SOCKET_AIDING = 8,    ///< sender to estimator, since version 1.9
   FBVINS_SOCKET_WELCOME = 65,  ///< estimator to sender
   FBVINS_SOCKET_RELEASED = 66,
   FBVINS_SOCKET_STATUS = 67,
@@ -205,6 +206,22 @@ typedef struct FbvinsSocketTag {
   double covariance_BT[21];  ///< upper triangle by rows, of (dp in the body in m, dtheta in the tag in rad)
   double p_AT[3], q_AT[4];   ///< in the building, where that is known
 } FbvinsSocketTag;
+
+/// FbvinsSocketAiding::sensor
+enum { FBVINS_SOCKET_RANGE = 0, FBVINS_SOCKET_VELOCITY = 1, FBVINS_SOCKET_PRESSURE = 2 };
+
+/// A reading of a sensor that aids images and IMU (docs/rangefinder.md, velocity.md, barometer.md). Fields that its sensor does
+/// not have are 0.
+typedef struct FbvinsSocketAiding {
+  FbvinsSocketHeader header;
+  int64_t t_ns;  ///< of the cameras' clock
+  uint32_t sensor;
+  uint32_t reserved;
+  double value[3];   ///< of a range: m along x, infinite where it sees nothing; of a velocity: m/s; of a pressure: Pa
+  double sigma[3];   ///< standard deviations of these; of a velocity 100 along an axis that is not measured
+  double p_BS[3], q_BS[4];  ///< where the sensor sits in the body, m, and its axes: w, x, y, z; not of a pressure
+  double nearest_m, farthest_m;  ///< of a range
+} FbvinsSocketAiding;
 
 /// What is known of the cameras' device, for `fbvins live --check` and for people. The newest one counts.
 typedef struct FbvinsSocketDevice {

@@ -26,15 +26,15 @@ class SensorInput {
   virtual void push(StereoFrame frame) = 0;
   /// A measurement for the map, on the cameras' clock. Who has no map leaves it.
   virtual void push_anchor(Anchor anchor) { (void)anchor; }
-  /// A rangefinder's reading, on the cameras' clock. Who looks at images and the IMU alone leaves it.
-  virtual void push_range(const RangeSample& reading) { (void)reading; }
+  /// A reading of an aiding sensor, on the cameras' clock. Who looks at images and the IMU alone leaves it.
+  virtual void push_aiding(const AidingSample& reading) { (void)reading; }
 };
 
 /// As what it is.
 inline void push_event(SensorInput& input, SensorEvent event) {
   std::visit(
       Overloaded{[&](const ImuSample& sample) { input.push(sample); }, [&](StereoFrame& frame) { input.push(std::move(frame)); },
-                 [&](const RangeSample& reading) { input.push_range(reading); }},
+                 [&](const AidingSample& reading) { input.push_aiding(reading); }},
       event);
 }
 

@@ -29,24 +29,19 @@ struct PlaceVerifierOptions {
   }
 };
 
-/// How fast the odometry may drift: variances grow with the path flown.
+/// How fast the odometry may drift where its covariance is not known: standard deviations after a metre, which grow with the root
+/// of the path. Set by tests.
 struct DriftOptions {
   double position_m = 0.006;
   double yaw_rad = 0.06 * kDegree;
-
-  template <class V>
-  void visit(V&& v) {
-    v("position_m", position_m, "m", "standard deviation of position after a metre; grows with the root of the path", 1e-5, 1.0);
-    v("yaw_rad", yaw_rad, "rad", "standard deviation of yaw after a metre; grows with the root of the path", 1e-6, 0.2);
-  }
 };
 
 struct LoopOptions {
   PlaceExtractorOptions extraction;
   PlaceVerifierOptions verification;
   DriftOptions drift;
-  double max_distance_m = 4;
-  double gate_sigma = 5;
+  double max_distance_m = 4;  ///< places farther than this from the predicted position are not tried; set by tests
+  double gate_sigma = 5;      ///< a recognised place farther than this from the odometry's prediction is refused; set by tests
   double follow_mps = 0.15;
   double follow_radps = 3 * kDegree;
   int thin_above = 600;
@@ -60,13 +55,10 @@ struct LoopOptions {
     v("memory_mb", memory_mb, "MB", "features of a loaded map in memory at most; others are read from its file when needed", 0,
       1000000);
     v("thin_above", thin_above, "", "keyframes above which redundant ones are removed", 10, 1000000);
-    v("max_distance_m", max_distance_m, "m", "places farther than this from the predicted position are not tried", 0.1, 1000.0);
-    v("gate_sigma", gate_sigma, "", "a recognised place farther than this from the odometry's prediction is refused", 1.0, 100.0);
     v("follow_mps", follow_mps, "m/s", "fastest motion of the smooth T_MW", 0.001, 100.0);
     v("follow_radps", follow_radps, "rad/s", "fastest turn of the smooth T_MW", 1e-4, 20.0);
     v.group("extraction", extraction, "features of a keyframe");
     v.group("verification", verification, "whether two keyframes show the same place");
-    v.group("drift", drift, "how fast odometry drifts");
   }
 };
 

@@ -13,6 +13,7 @@
 
 #include "fbvins/mavlink/flight_messages.hpp"
 #include "fbvins/mavlink/parameter_messages.hpp"
+#include "fbvins/mavlink/sensor_messages.hpp"
 
 namespace fbvins {
 
@@ -170,6 +171,7 @@ using MavlinkMessage =
     std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage, StatusTextMessage,
                  PositionTargetMessage, CommandMessage, CommandAckMessage, LandedStateMessage, HilSensorMessage,
                  HilActuatorControlsMessage, LocalPositionMessage, AttitudeQuaternionMessage, GlobalOriginMessage,
-                 KnownOriginMessage, HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage>;
+                 KnownOriginMessage, HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage,
+                 DistanceSensorMessage, OpticalFlowRadMessage, ScaledPressureMessage>;
 
 }  // namespace fbvins

@@ -25,9 +25,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/estimator/own_sensor.hpp"
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/pipeline/system_options.hpp"
 #include "fbvins/types/anchor.hpp"
@@ -48,6 +50,7 @@ struct SystemParts {
   std::unique_ptr<Frontend> frontend = {};  ///< instead of `options.frontend.kind`
   Mapper* mapper = nullptr;                 ///< gets every keyframe; not owned, must live longer than the System
   std::optional<ImuState> imu_state = {};   ///< this IMU's biases at the end of an earlier flight
+  std::vector<std::shared_ptr<OwnSensor>> sensors = {};  ///< that the library does not know
 };
 
 class System {
@@ -73,7 +76,8 @@ class System {
   void on_map_update(std::function<void(const MapUpdate&)> callback);
 
   /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded). Returns the error of the
-  /// stage that failed, if one has; the event is dropped then. An error, and no change, for an impossible range.
+  /// stage that failed, if one has; the event is dropped then. An error, and no change, for an impossible reading of an aiding
+  /// sensor.
   Result<void> push(SensorEvent event);
   /// A measurement for the mapper, of the images' clock; between the events, best before the next image. One that comes late is
   /// used as long as the map remembers the motion then (some seconds). An error, and no change, for one that is impossible.

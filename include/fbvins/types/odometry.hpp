@@ -42,8 +42,12 @@ enum class HealthReason {
   imu_vibration,       ///< readings are shaken so much that they say little
   correction_pending,  ///< a correction larger than a good pose may be wrong is published step by step
   range_disagrees,     ///< a rangefinder's readings lie on no floor: they are left out
+  velocity_disagrees,  ///< a sensor of velocity contradicts the rest: it is left out
+  pressure_disagrees,  ///< a barometer does: it is left out
 };
-inline constexpr HealthReason kLastHealthReason = HealthReason::range_disagrees;
+inline constexpr HealthReason kLastHealthReason = HealthReason::pressure_disagrees;
+/// Whether it is that of an aiding sensor that is left out: the pose is as good as without it.
+constexpr bool is_of_aiding(HealthReason reason) { return reason >= HealthReason::range_disagrees; }
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);

@@ -9,11 +9,11 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/anchor.hpp"
 #include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
-#include "fbvins/types/range.hpp"
 
 namespace fbvins {
 
@@ -23,7 +23,7 @@ struct SensorPacket {
   StereoFrame frame;
   ImuSegment imu;
   std::vector<Anchor> anchors = {};  ///< that came since the image before, of any stamp
-  std::vector<RangeSample> ranges = {};  ///< since the image before
+  std::vector<AidingSample> aiding = {};  ///< since the image before
 };
 
 /// Where a feature is seen in one camera.
@@ -100,7 +100,7 @@ struct TrackedFrame {
   std::shared_ptr<const DepthImage> depth = {};      ///< of a rig with a depth sensor
   ExposureOffsets offsets = {};                      ///< of the cameras' images; filled by the system
   std::vector<Anchor> anchors = {};                  ///< for the map
-  std::vector<RangeSample> ranges = {};              ///< since the image before; filled by the system
+  std::vector<AidingSample> aiding = {};             ///< since the image before; filled by the system
   bool after_clock_step = false;                     ///< as in StereoFrame; filled by the system
 };
 

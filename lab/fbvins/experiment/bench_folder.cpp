@@ -60,11 +60,8 @@ Result<void> BenchFolder::make() const {
   for (const char* name : {"cells", "logs", "locks"}) folders.push_back(fs::path(options_.out) / name);
   for (const Recording& r : plan_.recordings)
     if (r.rendered) folders.push_back(fs::path(r.path).parent_path());
-  for (const fs::path& folder : folders) {
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder.string(), error.message())};
-  }
+  for (const fs::path& folder : folders)
+    if (Result<void> made = make_folders(folder.string()); !made) return made;
   return {};
 }
 

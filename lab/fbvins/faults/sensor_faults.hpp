@@ -73,7 +73,7 @@ class FaultyInput final : public SensorInput {
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
   void push_anchor(Anchor anchor) override { input_.push_anchor(std::move(anchor)); }
-  void push_range(const RangeSample& reading) override { input_.push_range(reading); }
+  void push_aiding(const AidingSample& reading) override { input_.push_aiding(reading); }
 
  private:
   struct Injected {

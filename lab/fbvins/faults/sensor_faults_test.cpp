@@ -47,7 +47,7 @@ Notes fly(const std::vector<std::string>& texts) {
 TEST(SensorFaults, WithoutAFaultEverythingPasses) {
   const Notes notes = fly({});
   EXPECT_EQ(notes.events.size(), 330u);
-  for (const auto& [when, event] : notes.events) EXPECT_EQ(std::visit([](const auto& e) { return e.t; }, event), ms(when));
+  for (const auto& [when, event] : notes.events) EXPECT_EQ(stamp_of(event), ms(when));
 }
 
 TEST(SensorFaults, SensorsFallSilent) {
@@ -131,7 +131,7 @@ TEST(SensorFaults, ABurstComesAtOnceAndWhole) {
   EXPECT_EQ(notes.events.size(), 330u);
   EXPECT_EQ(notes.stamps<ImuSample>(), fly({}).stamps<ImuSample>());
   for (const auto& [when, event] : notes.events) {
-    const std::int64_t t = std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event);
+    const std::int64_t t = stamp_of(event).ns / 1'000'000;
     if (t < 1000 || t >= 1500) {
       EXPECT_EQ(when, t);
     } else {
@@ -142,7 +142,7 @@ TEST(SensorFaults, ABurstComesAtOnceAndWhole) {
 
 TEST(SensorFaults, StampsLeapThereAndBack) {
   for (const auto& [when, event] : fly({"leap:1:0.5:7"}).events) {
-    const std::int64_t t = std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event);
+    const std::int64_t t = stamp_of(event).ns / 1'000'000;
     EXPECT_EQ(t - when, when >= 1000 && when < 1500 ? 7000 : 0);
   }
 }
@@ -191,7 +191,7 @@ TEST(SensorFaults, EachAltersItsTimeAndNothingElse) {
     // Events by their own time; those lost or held back count as altered.
     std::map<std::pair<std::int64_t, std::size_t>, SensorEvent> by_time;
     for (const auto& [when, event] : notes.events)
-      by_time[{std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event), event.index()}] = event;
+      by_time[{stamp_of(event).ns / 1'000'000, event.index()}] = event;
     for (const auto& [when, event] : clean.events) {
       const auto found = by_time.find({when, event.index()});
       const bool as_it_was = found != by_time.end() && same(found->second, event);

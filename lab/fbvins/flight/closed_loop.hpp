@@ -34,7 +34,7 @@ struct FlightSetup {
   QuadrotorOptions vehicle;
   ControlOptions control;
   WindOptions wind;
-  BarometerOptions barometer;
+  BarometerModelOptions barometer;
   EstimatorSetup estimator;
   double estimate_delay_s = 0.03;   ///< latency: from an image to its pose in the controller
   double mounting_error_deg = 0.2;  ///< standard deviation on each axis; unknown to the autopilot

@@ -137,14 +137,16 @@ LiveLink::LiveLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 LiveLink::~LiveLink() = default;
 
 Result<void> LiveLink::push(SensorEvent event) {
-  if (const auto* frame = std::get_if<StereoFrame>(&event)) {
-    impl_->inbox.sent_image(frame->t);
-    return impl_->sender->send(*frame);
-  }
-  if (std::holds_alternative<RangeSample>(event)) return {};  // the flight's vehicle has none
-  const auto& reading = std::get<ImuSample>(event);
-  impl_->pace.wait_for(reading.t);
-  return impl_->sender->send(reading);
+  return std::visit(Overloaded{[this](const StereoFrame& frame) {
+                                 impl_->inbox.sent_image(frame.t);
+                                 return impl_->sender->send(frame);
+                               },
+                               [this](const ImuSample& reading) {
+                                 impl_->pace.wait_for(reading.t);
+                                 return impl_->sender->send(reading);
+                               },
+                               [this](const AidingSample& reading) { return impl_->sender->send(reading); }},
+                    event);
 }
 
 Result<std::vector<KnownEstimate>> LiveLink::known_at(Time /*newest_image*/) { return impl_->inbox.take(); }

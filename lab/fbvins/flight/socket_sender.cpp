@@ -129,6 +129,11 @@ Result<void> SocketSender::send(const ImuSample& reading) {
   return put(&message, sizeof(message));
 }
 
+Result<void> SocketSender::send(const AidingSample& reading) {
+  const FbvinsSocketAiding message = socket_aiding(reading);
+  return put(&message, sizeof(message));
+}
+
 Result<void> SocketSender::send(const StereoFrame& frame) {
   while (true) {
     const Result<bool> heard = hear(0);

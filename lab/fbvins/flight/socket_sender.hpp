@@ -14,6 +14,7 @@
 #include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/socket_protocol.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 
@@ -28,6 +29,7 @@ class SocketSender {
   ~SocketSender();
 
   Result<void> send(const ImuSample& reading);
+  Result<void> send(const AidingSample& reading);
   /// Copies the images into shared memory. The frame is dropped if no slot is free.
   Result<void> send(const StereoFrame& frame);
 

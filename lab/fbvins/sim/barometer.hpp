@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-struct BarometerOptions {
+struct BarometerModelOptions {
   double noise_m = 0.08;
   double wander_m_rts = 0.02;
 
@@ -27,7 +27,7 @@ class Barometer {
  public:
   static constexpr double kRate_hz = 50;
 
-  Barometer(const BarometerOptions& options, std::uint64_t seed) : options_(options), rng_(seed, 72) {
+  Barometer(const BarometerModelOptions& options, std::uint64_t seed) : options_(options), rng_(seed, 72) {
     zero_m_ = rng_.uniform(-50, 50);  // the absolute height is unknown
   }
   double read(double true_height_m) {
@@ -36,7 +36,7 @@ class Barometer {
   }
 
  private:
-  BarometerOptions options_;
+  BarometerModelOptions options_;
   Rng rng_;
   double zero_m_ = 0;
 };

@@ -54,7 +54,7 @@ Result<void> write_euroc(Simulation& simulation, const std::string& folder, cons
       return done;
     if (progress) progress(i + 1, count);
   }
-  if (Result<void> done = recording->add_ranges(simulation.ranges); !done) return done;
+  if (Result<void> done = recording->add_aiding(simulation.aiding); !done) return done;
   return finish_recording(*recording, simulation.imu);
 }
 

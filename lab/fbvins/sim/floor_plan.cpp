@@ -2,7 +2,6 @@
 #include "fbvins/sim/floor_plan.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace fbvins {
 namespace {

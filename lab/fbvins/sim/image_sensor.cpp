@@ -2,7 +2,6 @@
 #include "fbvins/sim/image_sensor.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "fbvins/core/simd.hpp"

@@ -4,8 +4,6 @@
 // along it agree with the unchanged IMU data. Pure functions.
 #pragma once
 
-#include <string>
-
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/sim/imu_model.hpp"

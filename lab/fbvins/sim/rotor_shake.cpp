@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/sim/rotor_shake.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 

@@ -121,7 +121,6 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
   return rig;
 }
 
-
 StereoRig calibrated_rig(const SimulationOptions& o, StereoRig rig) {
   const CalibrationErrorOptions& error = o.calibration_error;
   if (error == CalibrationErrorOptions{} && o.sensors == "none") return rig;

@@ -71,6 +71,17 @@ class RenderingLoader : public FrameLoader {
   std::vector<Time> stamps_;  ///< of the images
 };
 
+std::vector<AidingSample> simulate_aiding(const SimulationOptions& o, const Simulation& s) {
+  const auto seed = static_cast<std::uint64_t>(o.seed);
+  const Mat3 R_BV = body_in_vehicle(s.rig, o.flight.camera_pitch_deg).conjugate().toRotationMatrix();
+  std::vector<AidingSample> out;
+  for (const auto& r : simulate_ranges(s.flight, *s.world, s.world_from_flight, R_BV, o.range, s.start, seed)) out.emplace_back(r);
+  for (const auto& r : simulate_velocities(s.flight, R_BV, o.velocity, s.start, seed)) out.emplace_back(r);
+  for (const auto& r : simulate_pressures(s.flight, o.barometer, s.start, seed)) out.emplace_back(r);
+  std::ranges::stable_sort(out, {}, [](const AidingSample& r) { return stamp_of(r); });
+  return out;
+}
+
 }  // namespace
 
 RenderedFrame render_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth,
@@ -126,8 +137,7 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o, const std::fun
   World world = build_world(o.world, plan_for(o, path), path, seed);
   if (change) change(world, s);
   s.world = std::make_shared<const World>(std::move(world));
-  s.ranges = simulate_ranges(s.flight, *s.world, s.world_from_flight, body_in_vehicle(s.rig, o.flight.camera_pitch_deg).conjugate().toRotationMatrix(),
-                             o.range, s.start, seed);
+  s.aiding = simulate_aiding(o, s);
   s.recorder = std::make_shared<FlightRecorder>(
       o, s.rig, [flight = s.flight](double t) { return flight.at(t); }, s.world_from_flight, s.world);
   return s;
@@ -143,7 +153,7 @@ DatasetContents contents_of(Simulation simulation, const std::string& name) {
   const Duration offset = Duration::from_seconds(simulation.rig.time_offset_s);
   contents.rig = simulation.calibrated;
   contents.imu = simulation.imu.samples;
-  contents.ranges = simulation.ranges;
+  contents.aiding = simulation.aiding;
   for (const TrueState& s : simulation.imu.truth) contents.ground_truth.push_back({s.t, s.T_WB, s.v_WB, s.bias});
   const StereoRig& rig = simulation.rig;
   std::vector<Time> stamps;

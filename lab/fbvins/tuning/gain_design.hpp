@@ -8,7 +8,6 @@
 
 #include <array>
 #include <string>
-#include <vector>
 
 #include "fbvins/tuning/plant_fit.hpp"
 

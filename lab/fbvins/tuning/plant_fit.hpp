@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <string>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/tuning/frequency_response.hpp"

@@ -14,6 +14,7 @@
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/imu/motion_merge.hpp"
+#include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -45,6 +46,14 @@ void take_imu(const BagMessage& message, const BagTopic& about, std::optional<Ti
   }
   if (recorded) sample->t = *recorded;
   topic.samples.push_back(*sample);
+}
+
+void take_aiding(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, AidingTopic& topic) {
+  auto read = aiding_of(message.data, about.encoding, about.type);
+  if (!read) return void(++topic.malformed);
+  if (recorded) stamp_of(read->reading) = *recorded;
+  if (topic.readings.empty()) topic.frame = read->frame;
+  topic.readings.push_back(std::move(read->reading));
 }
 
 void take_image(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, ImageTopic& topic) {
@@ -88,24 +97,6 @@ const BagCamera* camera_for(const BagContents& contents, std::string topic) {
   return nullptr;
 }
 
-/// Takes coordinates in `from` to `to`, along the static transforms.
-std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transforms, const std::string& to,
-                                         const std::string& from) {
-  std::map<std::string, Pose<B, B>> found{{to, {}}};
-  std::deque<std::string> open{to};
-  while (!open.empty() && !found.contains(from)) {
-    const std::string at = open.front();
-    open.pop_front();
-    for (const BagTransform& t : transforms) {
-      const Pose<B, B> T(t.q, t.p);
-      if (t.parent == at && found.try_emplace(t.child, found.at(at) * T).second) open.push_back(t.child);
-      if (t.child == at && found.try_emplace(t.parent, found.at(at) * T.inverse()).second) open.push_back(t.parent);
-    }
-  }
-  const auto end = found.find(from);
-  return end == found.end() ? std::nullopt : std::optional(end->second);
-}
-
 /// Joins a gyroscope and an accelerometer on topics of their own, both in order of stamps: a reading for each of the gyroscope's.
 std::vector<ImuSample> merged(const std::vector<ImuSample>& gyro, const std::vector<ImuSample>& accel) {
   MotionMerge merge;
@@ -132,6 +123,23 @@ const BagCamera::Rectified* rectified_of(const BagCamera& camera, const std::str
 }
 
 }  // namespace
+
+std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transforms, const std::string& to,
+                                         const std::string& from) {
+  std::map<std::string, Pose<B, B>> found{{to, {}}};
+  std::deque<std::string> open{to};
+  while (!open.empty() && !found.contains(from)) {
+    const std::string at = open.front();
+    open.pop_front();
+    for (const BagTransform& t : transforms) {
+      const Pose<B, B> T(t.q, t.p);
+      if (t.parent == at && found.try_emplace(t.child, found.at(at) * T).second) open.push_back(t.child);
+      if (t.child == at && found.try_emplace(t.parent, found.at(at) * T.inverse()).second) open.push_back(t.parent);
+    }
+  }
+  const auto end = found.find(from);
+  return end == found.end() ? std::nullopt : std::optional(end->second);
+}
 
 std::string rectified_topics(const BagContents& contents, const ChosenTopics& topics) {
   std::vector<std::string> said;
@@ -176,6 +184,7 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
     if (about.type == "sensor_msgs/Imu") take_imu(*message, about, recorded, out.imu[about.name]);
     else if (about.type == "sensor_msgs/Image" || about.type == "sensor_msgs/CompressedImage")
       take_image(*message, about, recorded, out.images[about.name]);
+    else if (is_aiding_type(about.type)) take_aiding(*message, about, recorded, out.aiding[about.name]);
     else if (about.type == "sensor_msgs/CameraInfo") take_camera(*message, about, out);
     else if (about.type == "geometry_msgs/Transform") take_stream_transform(*message, about, out);
     else if (about.type == "tf2_msgs/TFMessage" && about.name.ends_with("tf_static")) {

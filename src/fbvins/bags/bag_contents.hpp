@@ -31,9 +31,16 @@ struct ImageTopic {
   int malformed = 0;
 };
 
+struct AidingTopic {
+  std::vector<AidingSample> readings;  ///< in recorded order, as if the sensor's axes were the body's
+  std::string frame;
+  int malformed = 0;
+};
+
 struct BagContents {
   std::map<std::string, ImuTopic> imu;  ///< by topic
   std::map<std::string, ImageTopic> images;
+  std::map<std::string, AidingTopic> aiding;
   std::map<std::string, BagCamera> cameras;   ///< first camera_info of each topic
   std::string camera_problem;                 ///< why the first unusable one cannot be used
   std::vector<BagTransform> transforms;       ///< the static ones
@@ -71,6 +78,7 @@ struct ChosenTopics {
   std::string imu;                   ///< empty: none
   std::string accel;  ///< of a separate accelerometer: `imu` is the gyroscope's then; found by its name, never given
   std::string depth;  ///< images of a depth sensor, for one camera; empty: none
+  std::vector<std::string> aiding = {};  ///< of sensors that aid, named, or of a bag of ours
 };
 
 /// All of the calibration, noise figures included, where the bag has it for these topics; of cameras that are not among them,
@@ -88,6 +96,9 @@ std::string rectified_topics(const BagContents& contents, const ChosenTopics& to
 std::vector<std::string> calibrated_cameras(const BagContents& contents, const ChosenTopics& topics);
 /// Why the depth images do not lie on those of the first camera, pixel by pixel, as far as the bag tells; empty: they do.
 std::string not_registered(const BagContents& contents, const ChosenTopics& topics);
+/// Takes coordinates in `from` to `to`, along the static transforms.
+std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transforms, const std::string& to,
+                                         const std::string& from);
 /// The depth images' own lens and pose, by camera_info and transforms; nullopt where the bag has them not.
 std::optional<MountedCamera> depth_camera_of(const BagContents& contents, const ChosenTopics& topics, const StereoRig& rig);
 

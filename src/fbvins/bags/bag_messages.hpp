@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "fbvins/bags/message_fields.hpp"
+#include "fbvins/io/message_fields.hpp"
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/trajectory.hpp"

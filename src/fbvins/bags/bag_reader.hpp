@@ -20,7 +20,7 @@
 #include <string_view>
 #include <vector>
 
-#include "fbvins/bags/message_fields.hpp"
+#include "fbvins/io/message_fields.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"

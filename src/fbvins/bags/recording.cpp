@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "fbvins/bags/bag_aiding.hpp"
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/bag_loader.hpp"
 #include "fbvins/bags/bag_stamps.hpp"
@@ -180,9 +181,8 @@ class BagRecording {
     };
     if (topics_.cameras.size() > 1 && info.left.unpaired == info.left.listed) return never(topics_.cameras[1]);
     if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(topics_.depth);
-    if (topics_.imu.empty()) return {};
-    out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);
-    return {};
+    if (!topics_.imu.empty()) out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);
+    return read_aiding(contents_, topics_, out_);
   }
 
   Result<void> cut() {
@@ -194,6 +194,7 @@ class BagRecording {
     if (!out_.imu.empty() && (out_.imu.back().t < first || out_.imu.front().t > last))
       return Error{ErrorCode::malformed, fmt::format("the stamps on {} do not overlap the images'", topics_.imu)};
     if (begins_later(o)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
+    if (begins_later(o)) std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < first - kImuLeadIn; });
     return {};
   }
 

@@ -8,6 +8,7 @@
 
 #include "fbvins/bags/ros1_messages.hpp"
 #include "fbvins/core/atomic_file.hpp"
+#include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/little_endian.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_messages.hpp"
@@ -48,7 +49,10 @@ struct ChunkInfo {
 
 struct Ros1BagWriter::State {
   State(AtomicFile opened, const StereoRig& rig)
-      : file(std::move(opened)), depth_frame(rig.depth && rig.depth->own ? kDepthFrame : kLeftFrame), all(ros1::topics(rig)) {}
+      : file(std::move(opened)),
+        depth_frame(rig.depth && rig.depth->own ? kDepthFrame : kLeftFrame),
+        all(ros1::topics(rig)),
+        time_offset(Duration::from_seconds(rig.time_offset_s)) {}
 
   AtomicFile file;
   std::string_view depth_frame;
@@ -56,6 +60,8 @@ struct Ros1BagWriter::State {
   ChunkInfo info;
   std::vector<ChunkInfo> chunks;
   std::vector<ros1::Topic> all;
+  Duration time_offset;
+  AidingSensors aiding;
 
   Result<void> rename(const std::map<std::string, std::string>& names) {
     for (const auto& [before, after] : names) {
@@ -196,6 +202,20 @@ Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
   }
   if (!frame.depth) return {};
   return state_->add(ros1::kDepth, frame.t, ros1::depth_message(frame.t, state_->depth_frame, *frame.depth));
+}
+
+Result<void> Ros1BagWriter::add(const AidingSample& of_images) {
+  AidingSample reading = of_images;
+  const Time t = stamp_of(reading) = stamp_of(reading) + state_->time_offset;
+  AidingSensors::Sensor* sensor = state_->aiding.find(reading);
+  if (sensor == nullptr) {
+    sensor = &state_->aiding.add(reading, state_->all.size());
+    state_->all.push_back(ros1::aiding_topic("/" + sensor->name, reading));
+    if (sensor->T_BS)
+      if (Result<void> done = state_->add(ros1::kTransforms, t, ros1::transform_message(t, sensor->name, *sensor->T_BS)); !done) return done;
+  }
+  const std::string_view frame = sensor->T_BS ? std::string_view(sensor->name) : kBodyFrame;
+  return state_->add(static_cast<std::uint32_t>(sensor->topic), t, aiding_message(reading, frame, Encoding::ros1));
 }
 
 Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) {

@@ -36,6 +36,8 @@ class Ros1BagWriter {
   // An error for a stamp that ROS cannot hold (before 1970, after 2106), or where the disk is full.
   Result<void> add(const ImuSample& sample);
   Result<void> add(const StereoFrame& frame);
+  /// Its stamp is of the images' clock, and written on the IMU's.
+  Result<void> add(const AidingSample& reading);
   /// On kBagTruthTopic.
   Result<void> add_truth(Time t, const Pose<W, B>& T_WB);
   /// On kBagOdometryTopic.

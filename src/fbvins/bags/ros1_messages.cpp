@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/core/overloaded.hpp"
 #include "fbvins/io/little_endian.hpp"
 #include "fbvins/io/ros_messages.hpp"
 
@@ -103,6 +104,39 @@ std::vector<Topic> topics(const StereoRig& rig) {
     out.push_back({bag_camera_topic(i), "sensor_msgs/Image", kImage, image});
     out.push_back({fmt::format("/cam{}/camera_info", i), "sensor_msgs/CameraInfo", kCamera, camera});
   }
+  return out;
+}
+
+Topic aiding_topic(const std::string& name, const AidingSample& reading) {
+  constexpr std::pair<const char*, const char*> kTwist{"geometry_msgs/Twist",
+                                                       "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"},
+      kTwistWithCovariance{"geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"};
+  return std::visit(
+      Overloaded{[&](const RangeSample&) {
+                   return Topic{name, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148",
+                                definition("uint8 ULTRASOUND=0\nuint8 INFRARED=1\nHeader header\nuint8 radiation_type\nfloat32 field_of_view\n"
+                                           "float32 min_range\nfloat32 max_range\nfloat32 range\n",
+                                           {kHeader})};
+                 },
+                 [&](const VelocitySample&) {
+                   return Topic{name, "geometry_msgs/TwistWithCovarianceStamped", "8927a1a12fb2607ceea095b2dc440a96",
+                                definition("Header header\ngeometry_msgs/TwistWithCovariance twist\n",
+                                           {kHeader, kTwistWithCovariance, kTwist, kVector})};
+                 },
+                 [&](const PressureSample&) {
+                   return Topic{name, "sensor_msgs/FluidPressure", "804dc5cea1c5306d6a2eb80b9833befe",
+                                definition("Header header\nfloat64 fluid_pressure\nfloat64 variance\n", {kHeader})};
+                 }},
+      reading);
+}
+
+std::string transform_message(Time t, std::string_view frame, const Pose<B, B>& T_BS) {
+  std::string out;
+  append_le(out, std::uint32_t{1});
+  add_header(out, t, kBodyFrame);
+  add_text(out, frame);
+  add_doubles(out, T_BS.p.data(), 3);
+  add_quaternion(out, T_BS.q);
   return out;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 
@@ -45,6 +46,10 @@ inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
 /// Seconds and nanoseconds, 32 bits each.
 std::uint64_t ros_time(Time t);
 
+/// Of an aiding sensor.
+Topic aiding_topic(const std::string& name, const AidingSample& reading);
+/// Of a frame of the body's.
+std::string transform_message(Time t, std::string_view frame, const Pose<B, B>& T_BS);
 std::string imu_message(const ImuSample& sample);
 std::string image_message(Time t, std::string_view frame, const Image& image);
 std::string depth_message(Time t, std::string_view frame, const DepthImage& depth);

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
@@ -154,11 +155,15 @@ Result<ChosenTopics> sorted_by_kind(const BagContents& contents, const std::vect
       if (!std::exchange(out.depth, topic).empty()) return twice("depth sensors");
     } else if (contents.imu.contains(topic)) {
       if (!std::exchange(out.imu, topic).empty()) return twice("IMUs");
+    } else if (contents.aiding.contains(topic)) {
+      if (std::ranges::find(out.aiding, topic) != out.aiding.end()) return twice("sensors of one name");
+      out.aiding.push_back(topic);
     } else {
+      const std::string aiding = contents.aiding.empty() ? "" : fmt::format(", of other sensors on {}", listed(names(contents.aiding)));
       return Error{ErrorCode::not_found,
                    fmt::format("there are neither images nor IMU readings on '{}'; there are images on {}, "
-                               "readings on {}",
-                               printable(topic), listed(names(contents.images)), listed(names(contents.imu)))};
+                               "readings on {}{}",
+                               printable(topic), listed(names(contents.images)), listed(names(contents.imu)), aiding)};
     }
   }
   if (std::ssize(out.cameras) > kMostCameras)
@@ -202,6 +207,9 @@ Result<ChosenTopics> choose_topics(const BagContents& contents, const std::vecto
     out->cameras = *std::move(found);
     out->cameras.resize(std::min(out->cameras.size(), static_cast<std::size_t>(wanted.most_cameras)));
   }
+  if (!contents.rig.empty())
+    for (const auto& [topic, readings] : contents.aiding)
+      if (is_own_aiding_topic(topic) && std::ranges::find(out->aiding, topic) == out->aiding.end()) out->aiding.push_back(topic);
   if (wanted.one_camera) out->cameras.resize(1);
   const std::vector<std::string> depths = image_topics(contents, true);
   if (!wanted.depth || out->cameras.size() > 1) out->depth.clear();

@@ -20,7 +20,8 @@ struct WantedTopics {
   int most_cameras = kMostCameras;  ///< where they are found, not named: as many as the calibration has
 };
 
-/// Those in `named`, told apart by what is on them: cameras in their order, IMU, depth images. Where no camera is named: the only
+/// Those in `named`, told apart by what is on them: cameras in their order, IMU, depth images, other sensors, which are used only
+/// where they are named or the bag is one of ours. Where no camera is named: the only
 /// image topic, the two with left and right in their names, or numbered ones (cam0, cam1, cam2 ...). Where no IMU is named: the
 /// only one, or gyroscope and accelerometer by their names. The error lists the topics there are.
 Result<ChosenTopics> choose_topics(const BagContents& contents, const std::vector<std::string>& named,

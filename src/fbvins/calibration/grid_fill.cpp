@@ -3,7 +3,6 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
-#include <array>
 #include <optional>
 
 #include "fbvins/calibration/corner_refine.hpp"

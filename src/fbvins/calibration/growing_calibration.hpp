@@ -7,7 +7,6 @@
 //   if (!progress.reached) print(progress.action);
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

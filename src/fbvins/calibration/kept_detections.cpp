@@ -122,9 +122,7 @@ std::vector<ImageFinding> KeptDetections::read_part(std::size_t part) const {
 }
 
 Result<void> KeptDetections::keep(std::size_t part, const ImageFindings& all) const {
-  std::error_code error;
-  fs::create_directories(folder_, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder_, error.message())};
+  if (Result<void> made = make_folders(folder_); !made) return made;
   std::string text = key_ + "\n";
   for (std::size_t i = part * kImagesOfPart; i < std::min(all.size(), (part + 1) * kImagesOfPart); ++i) text += text_of(*all[i]);
   return write_file_atomically(file_of(part), text);

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/geometry/jacobian_check.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 namespace fbvins {
 namespace pose_spline_test {

@@ -3,7 +3,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/calibration/board_pose.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"

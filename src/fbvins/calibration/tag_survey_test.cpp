@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 namespace fbvins {
 namespace tag_survey_test {
 

@@ -14,7 +14,7 @@
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 #include "tests/support/noise_texture.hpp"
 
 namespace fbvins {

@@ -21,12 +21,13 @@ constexpr std::size_t kKept = 3;
 
 void FirstSeconds::push(const SensorEvent& event) {
   if (is_over()) return;
-  if (const auto* sample = std::get_if<ImuSample>(&event)) {
-    samples_.push_back(*sample);
-    return;
-  }
-  if (std::holds_alternative<RangeSample>(event)) return;  // not examined
-  const StereoFrame& frame = std::get<StereoFrame>(event);
+  std::visit(Overloaded{[this](const ImuSample& sample) { samples_.push_back(sample); },
+                        [](const AidingSample&) {},  // not examined
+                        [this](const StereoFrame& frame) { keep(frame); }},
+             event);
+}
+
+void FirstSeconds::keep(const StereoFrame& frame) {
   images_.push_back(frame.t);
   const double due_s = kLook_s * static_cast<double>(kept_.size()) / kKept;
   if (kept_.size() < kKept && (frame.t - images_.front()).seconds() >= due_s) kept_.push_back(owned(frame));

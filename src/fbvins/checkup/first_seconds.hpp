@@ -25,6 +25,8 @@ class FirstSeconds {
   std::vector<Finding> findings() const;
 
  private:
+  void keep(const StereoFrame& frame);
+
   StereoRig rig_;
   std::vector<ImuSample> samples_;
   std::vector<Time> images_;

@@ -40,7 +40,7 @@ TEST(OptionTiers, AGroupIsShownOnlyWithAUserOption) {
   };
   EXPECT_TRUE(has("frontend.orb"));
   EXPECT_FALSE(has("frontend.orb.recognition"));
-  EXPECT_FALSE(has("loop.drift"));
+  EXPECT_FALSE(has("loop.verification"));
 }
 
 TEST(OptionTiers, TheTutorialExplainsEachOfThem) {

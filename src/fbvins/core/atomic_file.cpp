@@ -146,6 +146,20 @@ Result<void> write_file_atomically(const std::string& path, std::string_view byt
   return file->commit();
 }
 
+Result<void> make_folders(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", path, error.message())};
+  return {};
+}
+
+Result<void> write_files(const std::string& folder, const std::vector<NamedText>& files) {
+  if (Result<void> made = make_folders(folder); !made) return made;
+  for (const auto& [name, text] : files)
+    if (Result<void> done = write_file_atomically(folder + "/" + name, text); !done) return done;
+  return {};
+}
+
 Result<void> append_to_file(const std::string& path, std::string_view bytes) {
   const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   struct stat state {};

@@ -15,6 +15,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
@@ -56,6 +57,14 @@ class AtomicFile {
 
 /// All of a file at once.
 Result<void> write_file_atomically(const std::string& path, std::string_view bytes);
+/// Makes a folder, and those above it, where they are not there yet.
+Result<void> make_folders(const std::string& path);
+/// Name and content of a file.
+struct NamedText {
+  std::string name, text;
+};
+/// Files of one folder, which is made where it is not there yet.
+Result<void> write_files(const std::string& folder, const std::vector<NamedText>& files);
 /// To the end of a file that exists, and to the disk. Not atomic: a kill leaves a part of the bytes, which the reader must know.
 Result<void> append_to_file(const std::string& path, std::string_view bytes);
 /// A function that writes a file, as tests replace it.

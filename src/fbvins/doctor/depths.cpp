@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/doctor/depths.hpp"
 
-#include <algorithm>
-
 namespace fbvins {
 namespace {
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
 
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/doctor/axes.hpp"

@@ -2,7 +2,6 @@
 #include "fbvins/doctor/fixed_view.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <vector>
 

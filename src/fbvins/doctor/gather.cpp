@@ -2,7 +2,6 @@
 #include "fbvins/doctor/gather.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/depth_reader.hpp"
@@ -261,13 +260,17 @@ EvidenceGatherer::~EvidenceGatherer() = default;
 
 bool EvidenceGatherer::push(const SensorEvent& event) {
   State& s = *state_;
-  if (const auto* sample = std::get_if<ImuSample>(&event)) {
-    s.evidence.imu.push_back(corrected(*sample, s.evidence.rig.imu_noise.axes));
-    return true;
-  }
-  if (std::holds_alternative<RangeSample>(event)) return true;  // not examined
-  if (s.enough()) return false;
-  StereoFrame frame = std::get<StereoFrame>(event);
+  return std::visit(Overloaded{[&](const ImuSample& sample) {
+                                 s.evidence.imu.push_back(corrected(sample, s.evidence.rig.imu_noise.axes));
+                                 return true;
+                               },
+                               [](const AidingSample&) { return true; },  // not examined
+                               [&](const StereoFrame& frame) { return !s.enough() && push_frame(frame); }},
+                    event);
+}
+
+bool EvidenceGatherer::push_frame(StereoFrame frame) {
+  State& s = *state_;
   s.evidence.stamps.push_back(frame.t);
   frame.offsets += own_offsets(s.evidence.rig);
   s.evidence.untriggered = s.evidence.untriggered || frame.offsets.are_apart(0, 1);

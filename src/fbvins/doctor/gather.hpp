@@ -27,6 +27,7 @@ class EvidenceGatherer {
 
  private:
   struct State;
+  bool push_frame(StereoFrame frame);
   std::unique_ptr<State> state_;
 };
 

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <optional>
-#include <vector>
 
 #include "tests/support/synthetic_evidence.hpp"
 

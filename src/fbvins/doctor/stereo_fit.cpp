@@ -2,7 +2,6 @@
 #include "fbvins/doctor/stereo_fit.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/change_search.hpp"

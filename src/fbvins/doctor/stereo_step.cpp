@@ -2,7 +2,6 @@
 #include "fbvins/doctor/stereo_step.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "fbvins/core/median.hpp"

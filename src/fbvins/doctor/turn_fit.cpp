@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/two_view.hpp"

@@ -5,10 +5,10 @@
 
 #include <cmath>
 
-#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
+#include "tests/support/estimated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace calibration_test {

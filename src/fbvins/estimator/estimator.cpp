@@ -35,7 +35,8 @@ constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
 }  // namespace
 
-Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before)
+Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before,
+                     const std::vector<std::shared_ptr<OwnSensor>>& sensors)
     : options_(for_cameras_of(rig, options)),
       imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_(calibration_of(rig)),
@@ -45,7 +46,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       time_alignment_(rig, options.align_time_offset && !options.estimate_time_offset,
                       before ? before->time_offset : std::nullopt),
       exposures_(rig),
-      factors_(rig, options_),
+      factors_(rig, options_, sensors),
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
@@ -380,7 +381,7 @@ void Estimator::publish(Odometry& out) {
   if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
   // A sensor that is left out does not trouble the pose.
-  const auto is_fine = [&] { return out.health.state == HealthState::good || out.health.reason == HealthReason::range_disagrees; };
+  const auto is_fine = [&] { return out.health.state == HealthState::good || is_of_aiding(out.health.reason); };
   if (is_fine() && published_.pending_too_large()) settle_correction(level.T_FB, out);
   if (!is_fine() && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.

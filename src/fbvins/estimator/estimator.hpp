@@ -43,7 +43,8 @@ struct Estimate {
 class Estimator {
  public:
   /// `before`: the IMU's biases at the end of an earlier flight.
-  Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before = {});
+  Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before = {},
+            const std::vector<std::shared_ptr<OwnSensor>>& sensors = {});
 
   /// The state at the frame's stamp; health says whether it may be trusted.
   Estimate process(const TrackedFrame& tracked);

@@ -7,9 +7,9 @@
 #include <algorithm>
 
 #include "fbvins/core/angle.hpp"
-#include "fbvins/estimator/estimated_flight.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/types/protection.hpp"
+#include "tests/support/estimated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace estimator_outage_test {

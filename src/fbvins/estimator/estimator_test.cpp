@@ -9,9 +9,9 @@
 #include <cmath>
 #include <utility>
 
-#include "fbvins/estimator/estimated_flight.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
+#include "tests/support/estimated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace estimator_test {

@@ -47,6 +47,7 @@ struct Variable {
 struct DroppedFrame {
   FrameId frame, successor;
   Pose<B, B> T_successor_dropped;  ///< as estimated
+  Vec3 v_dropped_B = Vec3::Zero(), v_successor_B = Vec3::Zero();  ///< likewise, each in its own axes
 };
 
 class Factor {

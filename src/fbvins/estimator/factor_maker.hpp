@@ -8,6 +8,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/factor.hpp"
+#include "fbvins/estimator/own_sensor.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -36,7 +37,8 @@ class FactorMaker {
 /// In the order in which their factors are added up.
 class FactorMakers {
  public:
-  FactorMakers(const StereoRig& rig, const EstimatorOptions& options);
+  /// `sensors`: of the program that uses the library.
+  FactorMakers(const StereoRig& rig, const EstimatorOptions& options, const std::vector<std::shared_ptr<OwnSensor>>& sensors = {});
   std::vector<FrameFactor> make(const NewFrame& frame);
   /// Of the first sensor that is.
   HealthReason doubt() const;

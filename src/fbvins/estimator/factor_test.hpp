@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "fbvins/estimator/window_equations.hpp"
-#include "fbvins/geometry/jacobian_check.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 namespace fbvins::test {
 

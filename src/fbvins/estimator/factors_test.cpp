@@ -4,7 +4,7 @@
 
 #include "fbvins/estimator/factor_test.hpp"
 #include "fbvins/estimator/window_marginalisation.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace factors_test {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "fbvins/estimator/estimated_flight.hpp"
+#include "tests/support/estimated_flight.hpp"
 
 namespace fbvins {
 namespace filled_view_test {

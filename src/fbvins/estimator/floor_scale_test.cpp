@@ -5,7 +5,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/estimator/factor_test.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace floor_scale_test {

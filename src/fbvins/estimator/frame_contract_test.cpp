@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "fbvins/estimator/estimator.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace frame_contract_test {

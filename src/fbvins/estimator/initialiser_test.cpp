@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace initialiser_test {

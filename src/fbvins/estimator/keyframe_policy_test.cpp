@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/estimator/estimator.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace keyframe_policy_test {

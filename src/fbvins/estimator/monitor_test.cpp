@@ -5,7 +5,7 @@
 
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace monitor_test {

@@ -6,7 +6,7 @@
 
 #include "fbvins/estimator/window_marginalisation.hpp"
 #include "fbvins/estimator/window_solver.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace one_camera_window_test {

@@ -5,8 +5,6 @@
 #include <cmath>
 
 #include "fbvins/estimator/floor_scale.hpp"
-#include "fbvins/estimator/window_equations.hpp"
-#include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
 namespace {
@@ -23,56 +21,9 @@ constexpr std::size_t kReadingsOfFloor = 5;
 constexpr double kTimeOfFloor_s = 0.25;
 /// Known at a time: the floor and what stands on it.
 constexpr std::size_t kMostFloors = 4;
-/// What handing a reading on to the next frame adds.
-constexpr double kHandedOn_m = 0.002;
-
 Vec3 up_G(const Tilt& tilt) { return tilt.gravity_G(-1); }
 
 }  // namespace
-
-double RangeFactor::residual(const WindowProblem& w) const {
-  const double height_m = up_G(w.tilt).dot(w.frame(frame_).state.T_FB * hit_B_);
-  return (height_m - w.own_variable(floor_).value(0)) / sigma_m_;
-}
-
-double RangeFactor::cost(const WindowProblem& w) const {
-  const double r = residual(w);
-  return huber(r * r, w.weights.huber_sigma).cost;
-}
-
-double RangeFactor::linearise(const WindowProblem& w, NormalEquations& out) const {
-  const double r = residual(w);
-  const RobustValue robust = huber(r * r, w.weights.huber_sigma);
-  const int i = w.index_of(frame_);
-  const Pose<G, B> T_GB = w.linearisation_point(i).T_FB;
-  const Vec3 up = up_G(w.tilt);
-  Vec6 J_pose;
-  J_pose << up, hit_B_.cross(T_GB.q.conjugate() * up);
-  J_pose /= sigma_m_;
-  const Vec2 J_tilt = w.tilt.gravity_jacobian(-1).transpose() * (T_GB * hit_B_) / sigma_m_;
-  const double J_floor = -1 / sigma_m_;
-
-  const int pose = out.layout.pose_row(i), tilt = out.layout.tilt_row();
-  const int floor = row_of(w, out.layout, Variable::own_one(floor_));
-  const double weight = robust.weight;
-  out.g.segment<6>(pose) += weight * r * J_pose;
-  out.g(floor) += weight * r * J_floor;
-  out.H.block<6, 6>(pose, pose) += weight * J_pose * J_pose.transpose();
-  out.H.block<6, 1>(pose, floor) += weight * J_floor * J_pose;
-  out.H(floor, floor) += weight * J_floor * J_floor;
-  if (out.layout.tilt_size > 0) {
-    out.g.segment<2>(tilt) += weight * r * J_tilt;
-    out.H.block<2, 2>(tilt, tilt) += weight * J_tilt * J_tilt.transpose();
-    out.H.block<1, 2>(floor, tilt) += weight * J_floor * J_tilt.transpose();
-    out.H.block<6, 2>(pose, tilt) += weight * J_pose * J_tilt.transpose();
-  }
-  return robust.cost;
-}
-
-std::shared_ptr<const Factor> RangeFactor::without(const DroppedFrame& d) const {
-  return std::make_shared<const RangeFactor>(d.successor, floor_, d.T_successor_dropped * hit_B_,
-                                             std::hypot(sigma_m_, kHandedOn_m));
-}
 
 /// Each reading is carried to the frame by its velocity and angular rate.
 std::optional<RangeMaker::Hit> RangeMaker::hit_of(const NewFrame& f) {
@@ -83,7 +34,7 @@ std::optional<RangeMaker::Hit> RangeMaker::hit_of(const NewFrame& f) {
   Hit out;
   double variance = 0;
   int readings = 0;
-  for (const RangeSample& r : f.tracked.ranges) {
+  for (const RangeSample& r : readings_of<RangeSample>(f.tracked.aiding)) {
     if (!(r.distance_m >= r.nearest_m && r.distance_m <= r.farthest_m)) continue;
     const double after_s = (r.t - f.frame.t).seconds();
     const Vec3 along_B = so3_exp(after_s * rate_B) * r.direction_B;
@@ -142,12 +93,6 @@ bool RangeMaker::is_lowest(const Floor& floor, const SlidingWindow& window) cons
   });
 }
 
-void RangeMaker::count(const Hit& hit, bool used) {
-  const double since_s = newest_ ? std::min(0.5, (hit.t - *newest_).seconds()) : 0;
-  newest_ = hit.t;
-  left_out_s_ = std::clamp(left_out_s_ + (used ? -since_s : since_s), 0.0, 2 * kDoubt_s);
-}
-
 std::vector<std::shared_ptr<const Factor>> RangeMaker::make(const NewFrame& f) {
   std::erase_if(floors_, [&](const Floor& floor) { return f.window.own(floor.number) == nullptr; });  // a new window
   const std::optional<Hit> hit = hit_of(f);
@@ -155,12 +100,12 @@ std::vector<std::shared_ptr<const Factor>> RangeMaker::make(const NewFrame& f) {
   Floor* floor = floor_of(*hit, f.window);
   if (floor != nullptr) candidates_.clear();
   else floor = floor_of_candidates(*hit, f.window);
-  count(*hit, floor != nullptr);
+  doubt_.count(hit->t, floor != nullptr);
   if (floor == nullptr) return {};
   floor->seen = hit->t;
   std::vector<std::shared_ptr<const Factor>> out;
   out.push_back(
-      std::make_shared<const RangeFactor>(f.frame.id, floor->number, hit->p_B, std::hypot(hit->sigma_m, floor_sigma_m_)));
+      std::make_shared<const HeightFactor>(f.frame.id, floor->number, hit->p_B, std::hypot(hit->sigma_m, floor_sigma_m_)));
   if (images_show_scale_ || f.of_start || !is_lowest(*floor, f.window)) return out;
   FrameId newest;
   for (const Frame& frame : f.window.frames())

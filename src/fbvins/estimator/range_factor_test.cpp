@@ -9,7 +9,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/estimator/factor_test.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace range_factor_test {
@@ -20,26 +20,26 @@ WindowProblem window_with_floor() {
   return p;
 }
 
-TEST(RangeFactor, IsSound) {
+TEST(HeightFactor, IsSound) {
   WindowProblem p = window_with_floor();
   for (const int frame : {0, 3, 5}) {
     const double height = p.frames[frame].state.T_FB.p.z();
     for (const double below : {height + 1.1, height + 1.15, height + 2.5})  // right, a few sigmas off, an outlier
-      test::expect_sound(RangeFactor(FrameId{frame}, 3, Vec3(0.1, 0.05, -below), 0.02), p);
+      test::expect_sound(HeightFactor(FrameId{frame}, 3, Vec3(0.1, 0.05, -below), 0.02), p);
   }
   p.weights.estimate_tilt = false;
-  test::expect_sound(RangeFactor(FrameId{2}, 3, Vec3(0.1, 0.05, -1.3), 0.02), p);
+  test::expect_sound(HeightFactor(FrameId{2}, 3, Vec3(0.1, 0.05, -1.3), 0.02), p);
 }
 
-TEST(RangeFactor, IsHandedOnToTheNextFrame) {
+TEST(HeightFactor, IsHandedOnToTheNextFrame) {
   const WindowProblem p = window_with_floor();
-  const RangeFactor factor(FrameId{2}, 3, Vec3(0.1, 0.05, -1.3), 0.02);
+  const HeightFactor factor(FrameId{2}, 3, Vec3(0.1, 0.05, -1.3), 0.02);
   const Pose<B, B> T_32 = p.frames[3].state.T_FB.inverse() * p.frames[2].state.T_FB;
   const auto left = factor.without({FrameId{2}, FrameId{3}, T_32});
   ASSERT_NE(left, nullptr);
   EXPECT_FALSE(left->touches(FrameId{2}));
-  const auto& handed_on = dynamic_cast<const RangeFactor&>(*left);
-  const Vec3 before = p.frames[2].state.T_FB * factor.hit_B(), after = p.frames[3].state.T_FB * handed_on.hit_B();
+  const auto& handed_on = dynamic_cast<const HeightFactor&>(*left);
+  const Vec3 before = p.frames[2].state.T_FB * factor.point_B(), after = p.frames[3].state.T_FB * handed_on.point_B();
   EXPECT_LT((after - before).norm(), 1e-12);
   EXPECT_GT(handed_on.sigma_m(), factor.sigma_m());
 }
@@ -61,7 +61,7 @@ class Flight {
       r.t = frame.t, r.sigma_m = 0.01;
       r.distance_m = frame.state.T_FB.p.z() - surface_m(t_s_) + 0.01 * rng_.normal();
       if (reads) r.distance_m = reads(r.distance_m);
-      tracked.ranges = {r};
+      tracked.aiding = {r};
       const std::vector<TrackedFeature> none;
       const auto made = maker_.make({tracked, none, frame, window_, calibration_});
       out.push_back(made.empty() ? -1 : made.front()->variables().back().own);

@@ -5,7 +5,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/estimator/landmark_prior.hpp"
-#include "fbvins/geometry/jacobian_check.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 namespace fbvins {
 namespace reprojection_test {

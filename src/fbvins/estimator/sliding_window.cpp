@@ -218,7 +218,8 @@ void SlidingWindow::forget_frame(int index) {
 
 /// Of all frames: a factor of another frame may be about this one, too.
 void SlidingWindow::take_over_factors(const Frame& leaving, Frame& next) {
-  const DroppedFrame dropped{leaving.id, next.id, next.state.T_FB.inverse() * leaving.state.T_FB};
+  const DroppedFrame dropped{leaving.id, next.id, next.state.T_FB.inverse() * leaving.state.T_FB, leaving.state.v_B(),
+                             next.state.v_B()};
   std::vector<FrameFactor> taken;
   for (const FrameFactor& f : leaving.factors)
     if (auto left = f.factor->touches(leaving.id) ? f.factor->without(dropped) : f.factor) taken.push_back({f.order, std::move(left)});

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "fbvins/imu/carried_by_hand.hpp"
+#include "tests/support/carried_by_hand.hpp"
 
 namespace fbvins {
 namespace time_alignment_test {

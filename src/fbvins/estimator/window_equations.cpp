@@ -75,6 +75,20 @@ int row_of(const WindowProblem& window, const WindowLayout& at, const Variable& 
   return row;
 }
 
+void add_residual(const WindowProblem& window, const std::vector<Variable>& variables, const Eigen::MatrixXd& J,
+                  const Eigen::VectorXd& r, double weight, NormalEquations& out) {
+  std::vector<int> rows;
+  for (const Variable& v : variables)
+    for (int k = 0; k < window.size_of(v); ++k) rows.push_back(row_of(window, out.layout, v) + k);
+  const Eigen::VectorXd g = weight * J.transpose() * r;
+  const Eigen::MatrixXd H = weight * J.transpose() * J;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    out.g(rows[i]) += g(static_cast<Eigen::Index>(i));
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      if (rows[i] >= rows[k]) out.H(rows[i], rows[k]) += H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+  }
+}
+
 std::vector<int> rows_of(const WindowProblem& window, const WindowLayout& at, const WindowPrior& prior) {
   std::vector<int> rows;
   rows.reserve(static_cast<std::size_t>(prior.frames_row()) + 15 * prior.frames.size());

@@ -39,8 +39,14 @@ struct WindowLayout {
   int row_of(int frame, int k) const { return k < 6 ? pose_row(frame) + k : speed_bias_row(frame) + k - 6; }
 };
 
+struct NormalEquations;
+
 /// Where the variable begins.
 int row_of(const WindowProblem& window, const WindowLayout& at, const Variable& variable);
+/// Adds a factor's whitened residual r, of weight `weight`, with its derivatives by `variables`, whose columns follow one another
+/// in J; those that are not estimated have none.
+void add_residual(const WindowProblem& window, const std::vector<Variable>& variables, const Eigen::MatrixXd& J,
+                  const Eigen::VectorXd& r, double weight, NormalEquations& out);
 /// Of all variables of the prior, in its order.
 std::vector<int> rows_of(const WindowProblem& window, const WindowLayout& at, const WindowPrior& prior);
 

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/estimator/window_test_scene.hpp"
-#include "fbvins/geometry/jacobian_check.hpp"
+#include "tests/support/jacobian_check.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace window_equations_test {

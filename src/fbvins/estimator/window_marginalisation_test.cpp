@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "fbvins/estimator/window_solver.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace window_marginalisation_test {

@@ -5,7 +5,7 @@
 
 #include <Eigen/LU>
 
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace window_solver_test {

@@ -14,9 +14,9 @@
 #include <memory>
 #include <vector>
 
-#include "fbvins/estimator/ceres_residuals.hpp"
 #include "fbvins/estimator/window_solver.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/ceres_residuals.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace window_vs_ceres_test {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fbvins/estimator/estimated_flight.hpp"
+#include "tests/support/estimated_flight.hpp"
 
 namespace fbvins {
 namespace wrong_readings_test {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "fbvins/core/simd.hpp"
 #include "fbvins/features/int8_kernels.hpp"

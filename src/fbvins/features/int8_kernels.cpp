@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/features/int8_kernels.hpp"
 
-#include <algorithm>
 #include <cstring>
 
 #include "fbvins/core/simd.hpp"

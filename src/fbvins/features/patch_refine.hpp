@@ -10,8 +10,6 @@
 //   KltResult fine = refiner.refine(reference, pyramid_now, keypoint.pixel, camera, normalised_guess);
 #pragma once
 
-#include <optional>
-
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/features/klt.hpp"
 

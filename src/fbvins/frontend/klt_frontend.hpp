@@ -8,8 +8,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
-#include <vector>
 
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/epipolar_check.hpp"

@@ -5,7 +5,6 @@
 //   for (const Mat3& E : five_point(a, b)) score(E);   // b^T E a = 0 for the five pairs
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/geometry/jacobian_check.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 #include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "fbvins/geometry/so3.hpp"
 

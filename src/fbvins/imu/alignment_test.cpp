@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins {
 namespace alignment_test {

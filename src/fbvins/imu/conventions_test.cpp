@@ -6,10 +6,10 @@
 #include <numbers>
 
 #include "fbvins/imu/imu_residual.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
 #include "fbvins/types/odometry.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins {
 namespace conventions_test {

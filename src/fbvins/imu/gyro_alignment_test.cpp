@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "fbvins/imu/carried_by_hand.hpp"
+#include "tests/support/carried_by_hand.hpp"
 
 namespace fbvins {
 namespace gyro_alignment_test {

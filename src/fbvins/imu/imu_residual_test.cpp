@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/geometry/jacobian_check.hpp"
 #include "tests/support/integrated_test_motion.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 namespace fbvins {
 namespace imu_residual_test {

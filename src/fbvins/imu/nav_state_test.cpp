@@ -5,7 +5,7 @@
 
 #include <type_traits>
 
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins {
 namespace nav_state_test {

@@ -13,8 +13,8 @@
 #include "fbvins/core/rng.hpp"
 #include "fbvins/imu/alignment.hpp"
 #include "fbvins/imu/imu_history.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
+#include "tests/support/imu_test_motion.hpp"
 
 namespace fbvins {
 namespace real_imu_test {

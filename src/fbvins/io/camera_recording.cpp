@@ -15,7 +15,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargestImage_bytes = std::uint64_t{1} << 28u, kLargestYaml_bytes = 1u << 20u;
+constexpr std::uint64_t kLargestFile_bytes = std::uint64_t{1} << 28u, kLargestYaml_bytes = 1u << 20u;
 
 /// Reads a EuRoC folder step by step.
 class EurocCameras {
@@ -36,7 +36,7 @@ class EurocCameras {
       if (Result<void> done = take_imu(std::move(rows->imu.rows)); !done) return done.error();
     sort_by_time(out_.images);
     out_.take = [files = files_, images = out_.images](std::size_t index) -> CameraRecording::Decode {
-      Result<std::string> bytes = files->read(images[index].name, kLargestImage_bytes);
+      Result<std::string> bytes = files->read(images[index].name, kLargestFile_bytes);
       if (!bytes) return [error = bytes.error()]() -> Result<Image> { return error; };
       return [bytes = *std::move(bytes)] { return decode_image(bytes); };
     };

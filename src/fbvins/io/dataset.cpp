@@ -86,7 +86,7 @@ std::optional<SensorEvent> Dataset::next() {
       at_end_ = true;
       return std::nullopt;
     }
-    if (const auto reading = due_range()) return *reading;
+    if (const auto reading = due_aiding()) return *reading;
     auto frame = next_frame();
     if (!frame) continue;
     const std::vector<Time>& steps = contents_.info.clock_steps;
@@ -107,12 +107,12 @@ bool Dataset::imu_is_due() const {
 }
 
 /// On the images' clock.
-std::optional<RangeSample> Dataset::due_range() {
-  if (next_range_ == contents_.ranges.size()) return std::nullopt;
-  RangeSample reading = contents_.ranges[next_range_];
-  reading.t = reading.t - Duration::from_seconds(contents_.rig.time_offset_s);
-  if (reading.t > contents_.frames[next_frame_].t) return std::nullopt;
-  ++next_range_;
+std::optional<AidingSample> Dataset::due_aiding() {
+  if (next_aiding_ == contents_.aiding.size()) return std::nullopt;
+  AidingSample reading = contents_.aiding[next_aiding_];
+  stamp_of(reading) = stamp_of(reading) - Duration::from_seconds(contents_.rig.time_offset_s);
+  if (stamp_of(reading) > contents_.frames[next_frame_].t) return std::nullopt;
+  ++next_aiding_;
   return reading;
 }
 

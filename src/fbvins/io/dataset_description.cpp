@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
+#include "fbvins/core/overloaded.hpp"
 #include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/clock_steps.hpp"
 #include "fbvins/io/euroc_frames.hpp"
@@ -60,6 +62,20 @@ void describe_imu(const std::vector<ImuSample>& imu, double declared_hz, Dataset
   warn_about_rate(info.imu_rate_hz, declared_hz, info.warnings);
 }
 
+void describe_aiding(const std::vector<AidingSample>& readings, DatasetInfo& info) {
+  std::map<std::string, std::vector<Time>> stamps;
+  for (const AidingSample& reading : readings) {
+    const char* name = std::visit(Overloaded{[](const RangeSample&) { return "rangefinder"; }, [](const VelocitySample&) { return "velocity"; },
+                                             [](const PressureSample&) { return "barometer"; }},
+                                  reading);
+    stamps[name].push_back(stamp_of(reading));
+  }
+  for (const auto& [name, times] : stamps) {
+    const double rate_hz = times.size() > 1 ? measure_intervals(times).rate_hz : 0;
+    info.aiding.push_back({name, static_cast<int>(times.size()), rate_hz});
+  }
+}
+
 }  // namespace
 
 Result<void> cut_frames(const DatasetOptions& options, std::vector<FrameEntry>& frames) {
@@ -89,6 +105,7 @@ void describe(DatasetContents& contents) {
   info.longest_image_gap_start = images.longest_start;
   warn_about_gap(images, "images", info.warnings);
   describe_imu(contents.imu, contents.rig.imu_noise.rate_hz, info);
+  describe_aiding(contents.aiding, info);
   for (std::string& doubt : calibration_doubts(contents.rig)) info.warnings.push_back(std::move(doubt));
 }
 

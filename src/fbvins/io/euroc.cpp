@@ -8,6 +8,7 @@
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
+#include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/camera_order.hpp"
@@ -19,7 +20,6 @@
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/numbers.hpp"
-#include "fbvins/io/range_folder.hpp"
 #include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
@@ -64,7 +64,7 @@ class EurocReader {
     out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
     find_cameras();
     for (auto step : {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_rows,
-                      &EurocReader::read_frames, &EurocReader::read_imu, &EurocReader::read_ranges})
+                      &EurocReader::read_frames, &EurocReader::read_imu, &EurocReader::read_aiding})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
@@ -290,20 +290,30 @@ class EurocReader {
     return {};
   }
 
-  Result<void> read_ranges() {
-    const std::string folder = kRangeFolder;
-    if (!exists(folder + "data.csv")) return {};
+  /// Of all aiding sensors there are, in order of stamps.
+  Result<void> read_aiding() {
+    for (const AidingFolder& kind : aiding_folders())
+      for (int i = 0; i < kMostAiding; ++i) {
+        const std::string folder = fmt::format("{}{}/", kind.name, i);
+        if (!exists(folder + "data.csv")) continue;
+        if (Result<void> done = read_sensor(kind, folder); !done) return done;
+      }
+    std::ranges::stable_sort(out_.aiding, {}, [](const AidingSample& r) { return stamp_of(r); });
+    const Time first = out_.frames.front().t + Duration::from_seconds(out_.rig.time_offset_s);
+    if (begins_later(options_)) std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < first - kImuLeadIn; });
+    return {};
+  }
+
+  Result<void> read_sensor(const AidingFolder& kind, const std::string& folder) {
     if (!rows_.clock.begins.empty())
       return warn(fmt::format("{}: not used: the clock of the recording steps back", named(folder + "data.csv"))), Result<void>{};
     Result<std::string> csv = text(folder + "data.csv", kLargestBeside_bytes);
     if (!csv) return csv.error();
-    Result<std::vector<RangeSample>> ranges = parse_yaml(folder + "sensor.yaml", [&](YamlReader yaml) {
-      return parse_ranges(std::move(yaml), *csv, named(folder + "data.csv"), T_BI_, out_.info.warnings);
+    Result<std::vector<AidingSample>> readings = parse_yaml(folder + "sensor.yaml", [&](YamlReader yaml) {
+      return kind.parse({std::move(yaml), *csv, named(folder + "data.csv"), T_BI_}, out_.info.warnings);
     });
-    if (!ranges) return ranges.error();
-    out_.ranges = *std::move(ranges);
-    const Time first = out_.frames.front().t + Duration::from_seconds(out_.rig.time_offset_s);
-    if (begins_later(options_)) std::erase_if(out_.ranges, [&](const RangeSample& r) { return r.t < first - kImuLeadIn; });
+    if (!readings) return readings.error();
+    out_.aiding.insert(out_.aiding.end(), readings->begin(), readings->end());
     return {};
   }
 

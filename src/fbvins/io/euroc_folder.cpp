@@ -12,12 +12,12 @@
 #include <utility>
 
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/imu_axes_fields.hpp"
 #include "fbvins/io/imu_file.hpp"
 #include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
-#include "fbvins/io/range_folder.hpp"
 
 namespace fbvins {
 namespace {
@@ -201,14 +201,16 @@ Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<f
   return {};
 }
 
-Result<void> EurocFolder::add_ranges(const std::vector<RangeSample>& readings) {
-  if (readings.empty()) return {};
-  const fs::path folder = state_->mav0 / kRangeFolder;
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return cannot_write(folder);
-  if (Result<void> done = write_file(folder / "sensor.yaml", range_yaml(readings.front(), state_->origin)); !done) return done;
-  return write_file(folder / "data.csv", range_csv(readings));
+Result<void> EurocFolder::add_aiding(const std::vector<AidingSample>& readings) {
+  for (const AidingText& sensor : aiding_texts(readings, state_->origin)) {
+    const fs::path folder = state_->mav0 / sensor.folder;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) return cannot_write(folder);
+    if (Result<void> done = write_file(folder / "sensor.yaml", sensor.sensor_yaml); !done) return done;
+    if (Result<void> done = write_file(folder / "data.csv", sensor.csv); !done) return done;
+  }
+  return {};
 }
 
 Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth) {

@@ -153,6 +153,25 @@ Result<void> FlightRecord::add(const StereoFrame& frame) {
   return flush_if_large();
 }
 
+/// A sensor's topic, and where it sits, are written with its first reading.
+Result<void> FlightRecord::add(const AidingSample& of_images) {
+  AidingSample reading = of_images;
+  const Time t = stamp_of(reading) = stamp_of(reading) + Duration::from_seconds(rig_.time_offset_s);
+  if (Result<void> good = check_stamp(t); !good) return good;
+  AidingSensors::Sensor* sensor = aiding_.find(reading);
+  if (sensor == nullptr) {
+    sensor = &aiding_.add(reading, 0);
+    std::string type(aiding_type(reading));
+    type.insert(type.find('/'), "/msg");
+    const Result<std::size_t> topic = file_.add_topic({"/" + sensor->name, type, ros_definition(type)});
+    if (!topic) return topic.error();
+    sensor->topic = *topic;
+    write_calibration(t);
+  }
+  write(sensor->topic, t, [&](std::string& out) { out += aiding_message(reading, sensor->T_BS ? sensor->name : kBodyFrame, Encoding::cdr); });
+  return flush_if_large();
+}
+
 void FlightRecord::write_image(int camera, const StereoFrame& frame) {
   const Time t = frame.t + frame.offsets.of(camera);
   write(image_topic(camera), frame.t,
@@ -171,6 +190,8 @@ void FlightRecord::write_calibration(Time t) {
     cameras.push_back({kBodyFrame, names[static_cast<std::size_t>(i)], rig_.T_BC(i).q, rig_.T_BC(i).p});
   if (const auto& depth = rig_.depth; depth && depth->own)
     cameras.push_back({kBodyFrame, kDepthFrame, depth->own->T_BC.q, depth->own->T_BC.p});
+  for (const AidingSensors::Sensor& sensor : aiding_.all())
+    if (sensor.T_BS) cameras.push_back({kBodyFrame, sensor.name, sensor.T_BS->q, sensor.T_BS->p});
   write(kFixedTransforms, t, [&](std::string& out) { append_transforms(out, t, cameras); });
   calibration_t_ = t;
 }

@@ -6,7 +6,7 @@
 //   Result<void> taken = record->add(sample);    // in memory until it is a megabyte, or flush()
 //   Result<void> done = record->finish();
 //
-// IMU readings and frames must come in the order in which the estimator takes them: in that order they are read back.
+// IMU readings, frames and aiding sensors' readings must come in the order in which the estimator takes them: in that order they are read back.
 #pragma once
 
 #include <string>
@@ -14,6 +14,7 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/mcap_writer.hpp"
 #include "fbvins/io/ros_messages.hpp"
 #include "fbvins/types/image.hpp"
@@ -47,6 +48,8 @@ class FlightRecord {
   // An error where the disk is full, or for a stamp that ROS's messages cannot hold (before 1970, after 2038).
   Result<void> add(const ImuSample& sample);
   Result<void> add(const StereoFrame& frame);
+  /// Its stamp is of the images' clock, and written on the IMU's.
+  Result<void> add(const AidingSample& reading);
   /// Pose where there is one, and health.
   Result<void> add(const Odometry& odometry);
   Result<void> add(const MapUpdate& update);
@@ -77,6 +80,7 @@ class FlightRecord {
   McapWriter file_;
   StereoRig rig_;
   bool images_;
+  AidingSensors aiding_;
   Time calibration_t_{-1};               ///< when the camera extrinsics were last written
   Mat3 rate_covariance_ = Mat3::Zero();  ///< of the body's rate: a reading's noise, and the bias
 };

@@ -17,6 +17,7 @@
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_images.hpp"
 #include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/recorded_aiding.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_messages.hpp"
 
@@ -24,8 +25,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above the range of any sensor
-// IMU samples this long before the first frame delivered are of use for starting up.
-constexpr Duration kImuLeadIn = {1'000'000'000};
+constexpr Duration kImuLeadIn = {1'000'000'000};  // before the first frame: of use for starting up
 // The partner of an image is searched for among this many frames before it.
 constexpr std::ptrdiff_t kPairingReach = 8;
 
@@ -50,7 +50,9 @@ class RecordReader {
     drop_half_frame();
     for (auto step : {&RecordReader::check, &RecordReader::read_calibration})
       if (Result<void> done = (this->*step)(); !done) return done.error();
+    out_.aiding = aiding_.readings();
     continue_stamps(out_, name_);
+    if (!out_.info.clock_steps.empty()) out_.aiding.clear();
     join_without_trigger();
     if (Result<void> done = cut(); !done) return done.error();
     warn();
@@ -72,6 +74,7 @@ class RecordReader {
     if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
     if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
     if (topic == kDepthTopic) take_depth(message);
+    if (!aiding_.take(message)) reader_.complain(message.offset, "this is not a reading of its topic's sensor");
     if (const std::optional<std::size_t> further = further_camera(topic)) take_further(message, *further);
   }
 
@@ -266,6 +269,7 @@ class RecordReader {
     const auto first = std::find_if(out_.imu.begin(), out_.imu.end(), [&](const ImuSample& s) { return s.t >= start; });
     const auto cut = static_cast<std::size_t>(first - out_.imu.begin());
     out_.imu.erase(out_.imu.begin(), first);
+    std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < start; });
     for (FrameEntry& frame : out_.frames) *frame.imu_before -= std::min(cut, *frame.imu_before);
   }
 
@@ -290,6 +294,7 @@ class RecordReader {
   McapReader reader_;
   std::string name_;
   const DatasetOptions& options_;
+  RecordedAiding aiding_;
   bool ends_with_image_ = false;
   DatasetContents out_;
 };

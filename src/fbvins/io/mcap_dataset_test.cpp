@@ -68,10 +68,8 @@ bool same_image(const std::shared_ptr<const Image>& a, const std::shared_ptr<con
          std::equal(a->row(0), a->row(0) + static_cast<std::ptrdiff_t>(a->width()) * a->height(), b->row(0));
 }
 
-/// A record has images and the IMU's readings.
 void add_to(FlightRecord& record, const SensorEvent& event) {
-  if (const auto* sample = std::get_if<ImuSample>(&event)) EXPECT_TRUE(record.add(*sample));
-  else EXPECT_TRUE(record.add(std::get<StereoFrame>(event)));
+  EXPECT_TRUE(std::visit([&](const auto& e) { return record.add(e); }, event));
 }
 
 bool same_event(const SensorEvent& a, const SensorEvent& b) {
@@ -147,6 +145,45 @@ TEST_F(FlightRecordTest, GivesBackTheEventsAndTheirOrder) {
     EXPECT_EQ((*data)->info().left.unpaired, 1);
     EXPECT_EQ((*data)->info().right.unpaired, 1);
   }
+}
+
+/// Also where they sit, and on the images' clock whatever the time offset.
+TEST_F(FlightRecordTest, KeepsReadingsOfAidingSensors) {
+  rig_.time_offset_s = 0.01;
+  std::vector<SensorEvent> events;
+  for (int k = 0; k < 6; ++k) {
+    const Time t = frame(50 * k).t;
+    events.emplace_back(reading(50 * k + 10));
+    RangeSample down{.t = t, .distance_m = 1.25 + k, .sigma_m = 0.5, .p_B = Vec3(0.1, 0, 0)}, ahead = down;
+    ahead.direction_B = Vec3::UnitX(), ahead.t = t - Duration{kMs};
+    VelocitySample wheel{.t = t, .v_mps = Vec3(k, 0.1, 0), .sigma_mps = Vec3(0.1, 0.2, kUnmeasured_mps), .p_B = Vec3(0, 0, -0.3)};
+    wheel.q_BS = so3_exp(Vec3(0.1, 0.2, 0.3));
+    for (const AidingSample& r : {AidingSample(ahead), AidingSample(down), AidingSample(wheel), AidingSample(PressureSample{t, 1e5 + k, 3})})
+      events.emplace_back(r);
+    events.emplace_back(frame(50 * k));
+  }
+  write(events);
+  auto data = open_dataset(path_, {});
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_EQ((*data)->info().aiding.size(), 3u);
+  std::vector<AidingSample> written, back;
+  for (const SensorEvent& event : events)
+    if (const auto* r = std::get_if<AidingSample>(&event)) written.push_back(*r);
+  for (const SensorEvent& event : drain(**data))
+    if (const auto* r = std::get_if<AidingSample>(&event)) back.push_back(*r);
+  ASSERT_EQ(back.size(), written.size());
+  for (std::size_t i = 0; i < written.size(); ++i) EXPECT_EQ(stamp_of(back[i]), stamp_of(written[i])) << i;
+  const auto ranges = readings_of<RangeSample>(back);
+  ASSERT_EQ(ranges.size(), 12u);
+  EXPECT_LT((ranges[0].direction_B - Vec3::UnitX()).norm(), 1e-12);
+  EXPECT_LT((ranges[1].direction_B + Vec3::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((ranges[1].p_B - Vec3(0.1, 0, 0)).norm(), 1e-12);
+  EXPECT_EQ(ranges[3].distance_m, 2.25);
+  EXPECT_EQ(ranges[3].sigma_m, 0.5);
+  const auto velocity = readings_of<VelocitySample>(back).back();
+  EXPECT_EQ(velocity.v_mps, Vec3(5, 0.1, 0));
+  EXPECT_LT(velocity.q_BS.angularDistance(so3_exp(Vec3(0.1, 0.2, 0.3))), 1e-9);
+  EXPECT_EQ(readings_of<PressureSample>(back).back().pressure_pa, 100'005);
 }
 
 TEST_F(FlightRecordTest, KeepsTheOffsetsOfCamerasWithoutACommonTrigger) {

@@ -53,7 +53,7 @@ std::string McapWriter::statistics() const {
   std::string out;
   const std::size_t start = begin_mcap_record(out, McapRecord::statistics);
   append_le(out, messages);
-  append_le(out, static_cast<std::uint16_t>(schema_count_));
+  append_le(out, static_cast<std::uint16_t>(schema_of_.size()));
   append_le(out, static_cast<std::uint32_t>(channels_.size()));
   append_le(out, attachments_);
   append_le(out, metadata_);

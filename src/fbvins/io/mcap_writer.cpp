@@ -80,15 +80,25 @@ Result<McapWriter> McapWriter::create(const std::string& path, const McapLabel& 
 }
 
 McapWriter::McapWriter(std::string path, FileDescriptor file, const std::vector<McapTopic>& topics)
-    : path_(std::move(path)), file_(std::move(file)), channels_(topics.size()) {
-  std::map<std::string, std::uint16_t> schema_of;
-  for (std::size_t id = 0; id < topics.size(); ++id) {
-    const auto [schema, is_new] = schema_of.try_emplace(topics[id].type, static_cast<std::uint16_t>(schema_of.size() + 1));
-    if (is_new) append_schema(schemas_, schema->second, topics[id]);
-    append_channel(channel_records_, mcap_channel_id(id), schema->second, topics[id]);
-  }
-  schema_count_ = static_cast<int>(schema_of.size());
+    : path_(std::move(path)), file_(std::move(file)) {
+  for (const McapTopic& topic : topics) append_topic(topic);
   clear_chunk();
+}
+
+/// To the records of all topics, with its type where that is a new one.
+void McapWriter::append_topic(const McapTopic& topic) {
+  const auto [schema, is_new] = schema_of_.try_emplace(topic.type, static_cast<std::uint16_t>(schema_of_.size() + 1));
+  if (is_new) append_schema(schemas_, schema->second, topic);
+  append_channel(channel_records_, mcap_channel_id(channels_.size()), schema->second, topic);
+  channels_.emplace_back();
+}
+
+Result<std::size_t> McapWriter::add_topic(const McapTopic& topic) {
+  const std::size_t schemas = schemas_.size(), channels = channel_records_.size();
+  append_topic(topic);
+  const std::string records = schemas_.substr(schemas) + channel_records_.substr(channels);
+  if (Result<void> written = write_record(records); !written) return written.error();
+  return channels_.size() - 1;
 }
 
 Result<void> McapWriter::write_at(std::uint64_t offset, std::string_view bytes) const {

@@ -43,7 +43,9 @@ class McapWriter {
   /// overwritten.
   static Result<McapWriter> create(const std::string& path, const McapLabel& label, const std::vector<McapTopic>& topics);
 
-  // Both are written at once.
+  /// One more topic; its index.
+  Result<std::size_t> add_topic(const McapTopic& topic);
+  // These are written at once.
   Result<void> attach(const std::string& name, const std::string& media_type, const std::string& data);
   Result<void> add_metadata(const std::string& name, const std::map<std::string, std::string>& values);
 
@@ -78,6 +80,7 @@ class McapWriter {
   Result<void> write_at(std::uint64_t offset, std::string_view bytes) const;
   void take_back() const;
   Result<void> write_record(const std::string& record);
+  void append_topic(const McapTopic& topic);
   void close_chunk();
   void clear_chunk();
 
@@ -92,7 +95,7 @@ class McapWriter {
   FileDescriptor file_;
   std::uint64_t end_ = 0;  ///< bytes of the file that are whole
   std::string schemas_, channel_records_;
-  int schema_count_ = 0;
+  std::map<std::string, std::uint16_t> schema_of_;  ///< by type
   std::vector<Channel> channels_;
 
   std::string chunk_;        ///< waiting; its head is not yet filled in

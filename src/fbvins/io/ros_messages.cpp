@@ -270,6 +270,20 @@ std::optional<ImuSample> read_imu(std::string_view bytes) {
   return sample;
 }
 
+std::vector<std::pair<std::string, Pose<B, B>>> read_mountings(std::string_view bytes) {
+  CdrReader cdr(bytes);
+  std::vector<std::pair<std::string, Pose<B, B>>> out;
+  const auto count = cdr.get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count && cdr.ok(); ++i) {
+    cdr.get<std::int32_t>(), cdr.get<std::uint32_t>();  // the stamp
+    const std::string parent(cdr.text()), child(cdr.text());
+    const std::optional<RosPose> pose = get_pose(cdr, Time{});
+    if (!pose || parent != kBodyFrame || !pose->p.allFinite() || !(std::abs(pose->q.norm() - 1) < 1e-3)) continue;
+    out.emplace_back(child, Pose<B, B>{pose->q.normalized(), pose->p});
+  }
+  return out;
+}
+
 std::optional<RosPose> read_pose(std::string_view bytes) {
   CdrReader cdr(bytes);
   const std::optional<Time> t = get_header(cdr);

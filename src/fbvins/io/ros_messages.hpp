@@ -115,6 +115,8 @@ struct RosPose {
   Vec3 p;
 };
 /// PoseStamped; Odometry's pose.
+/// Of a tf2_msgs/TFMessage, those from the body: frame and pose in it.
+std::vector<std::pair<std::string, Pose<B, B>>> read_mountings(std::string_view bytes);
 std::optional<RosPose> read_pose(std::string_view bytes);
 std::optional<RosPose> read_odometry(std::string_view bytes);
 

@@ -153,13 +153,19 @@ void Ingest::push_anchor(Anchor anchor) {
   anchors_.push_back(std::move(anchor));
 }
 
-void Ingest::push_range(const RangeSample& reading) {
-  const std::lock_guard order(order_mutex_);
-  RangeSample corrected = reading;
-  corrected.t = clock_.corrected(ClockGuard::camera, reading.t);
+void Ingest::push_aiding(const AidingSample& reading) {
+  AidingSample corrected = reading;
+  {
+    const std::lock_guard order(order_mutex_);
+    stamp_of(corrected) = clock_.corrected(ClockGuard::camera, stamp_of(reading));
+  }
+  push_corrected(std::move(corrected));
+}
+
+void Ingest::push_corrected(AidingSample reading) {
   const std::lock_guard lock(mutex_);
   if (closed_ || !impossible(reading).empty()) return;
-  queue_.push_back(corrected);
+  queue_.push_back(std::move(reading));
   filled_.notify_one();
 }
 

@@ -40,7 +40,9 @@ class Ingest final : public SensorInput {
   void push(StereoFrame frame) override;
   /// Its stamp is corrected as those of the images are.
   void push_anchor(Anchor anchor) override;
-  void push_range(const RangeSample& reading) override;
+  void push_aiding(const AidingSample& reading) override;
+  /// One whose stamp is on the images' clock as corrected (host_of).
+  void push_corrected(AidingSample reading);
   /// Releases readings that have waited long enough (ImuOrder); to be called every few milliseconds.
   void tick();
 

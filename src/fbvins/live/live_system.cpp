@@ -87,7 +87,7 @@ struct LiveSystem::Impl {
     while (std::optional<SensorEvent> event = ingest.pop()) {
       std::visit(Overloaded{[this](const ImuSample& sample) { hub.publish(sample); },
                             [this](const StereoFrame& frame) { hub.publish(frame); },
-                            [](const RangeSample&) {}},  // no sink has a use for it
+                            [this](const AidingSample& reading) { hub.publish(reading); }},
                  *event);
       for (Anchor& anchor : ingest.take_anchors()) (void)system.push(std::move(anchor));  // impossible ones are left out
       if (Result<void> taken = system.push(std::move(*event)); !taken) return;            // the watcher reports it
@@ -197,6 +197,13 @@ void LiveSystem::on_tracked_frame(std::function<void(const TrackedFrame&)> callb
 }
 
 void LiveSystem::on_failure(std::function<void()> callback) { impl_->on_failure = std::move(callback); }
+
+void LiveSystem::push_of_host(AidingSample reading) {
+  const Time image = impl_->ingest.arrivals().newest;
+  if (image.ns == 0) return;
+  stamp_of(reading) = stamp_of(reading) + (image - impl_->ingest.host_of(image));
+  impl_->ingest.push_corrected(std::move(reading));
+}
 
 SensorInput& LiveSystem::input() {
   impl_->start();

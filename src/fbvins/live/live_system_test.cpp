@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "fbvins/estimator/estimator.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace live_system_test {

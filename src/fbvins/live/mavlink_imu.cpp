@@ -22,14 +22,6 @@ constexpr int kRequestsUnanswered = 3;
 
 /// Numbers on the wire are any 64 bits; a larger one is no clock's, and does not fit nanoseconds.
 constexpr std::uint64_t kLatestClock_usec = 3'800'000'000'000'000;
-constexpr std::int64_t kNsPerMs = 1'000'000;
-
-/// The time nearest to `expected` of a counter of milliseconds that begins anew after 49.7 days.
-Time unwrapped(std::uint32_t counter_ms, Time expected) {
-  const std::int64_t expected_ms = expected.ns / kNsPerMs;
-  const auto off_ms = static_cast<std::int32_t>(counter_ms - static_cast<std::uint32_t>(expected_ms));
-  return Time{(expected_ms + off_ms) * kNsPerMs};
-}
 
 Vec3 vector(const std::array<float, 3>& v) { return Vec3(v[0], v[1], v[2]); }
 Vec3 thousandths(const std::array<std::int16_t, 3>& v) { return 1e-3 * Vec3(v[0], v[1], v[2]); }

@@ -59,4 +59,11 @@ std::optional<TimesyncMessage> MavlinkPeer::question(Time now) {
   return TimesyncMessage{0, now.ns};
 }
 
+Time unwrapped(std::uint32_t counter_ms, Time expected) {
+  constexpr std::int64_t kNsPerMs = 1'000'000;
+  const std::int64_t expected_ms = expected.ns / kNsPerMs;
+  const auto off_ms = static_cast<std::int32_t>(counter_ms - static_cast<std::uint32_t>(expected_ms));
+  return Time{(expected_ms + off_ms) * kNsPerMs};
+}
+
 }  // namespace fbvins

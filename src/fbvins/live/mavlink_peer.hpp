@@ -46,6 +46,8 @@ class MavlinkPeer {
   ClockOffset clock_;
 };
 
+/// The time nearest to `expected` of a counter of milliseconds that begins anew after 49.7 days.
+Time unwrapped(std::uint32_t counter_ms, Time expected);
 /// True once in each period; missed periods are not made up for.
 bool is_due(Time now, Duration period, Time& next);
 

@@ -48,6 +48,7 @@ MavlinkSession::MavlinkSession(const MavlinkOptions& options, std::unique_ptr<Ma
       signer_(std::move(signer)),
       frames_(options.mounting),
       decoder_(signer_.get()),
+      aiding_(options.sensors, options.mounting),
       peer_(options.system_id) {
   if (const auto origin = parse_mavlink_origin(options.origin)) origin_ = *origin;
 }
@@ -159,6 +160,7 @@ MavlinkSession::Frames MavlinkSession::tick(Time now) {
     return out;
   }
   say_origin(now, out);
+  for (const CommandMessage& request : aiding_.requests(*peer_.address(), now)) say(request, out);
   if (options_.clock == MavlinkClock::flight_controller)
     if (const auto question = peer_.question(now)) say(*question, out);
   if (health_ && told_health_ != health_ && is_due(now, kTextEvery, next_text_)) {
@@ -180,6 +182,8 @@ void MavlinkSession::receive(const MavlinkFrame& frame, Time now, Frames& out) {
   if (std::holds_alternative<KnownOriginMessage>(frame.message) && peer_.address() &&
       frame.from.system == peer_.address()->system)
     origin_is_known_ = true;
+  if (peer_.address() && frame.from == *peer_.address() && peer_.clock_is_sure(now))
+    if (auto reading = aiding_.read(frame.message, clock().value(), now)) readings_.push_back(*std::move(reading));
   const auto* sync = std::get_if<TimesyncMessage>(&frame.message);
   if (sync != nullptr && sync->tc1 == 0 && may_send_poses(now)) say(TimesyncMessage{their_time(now).ns, sync->ts1}, out);
 }

@@ -6,9 +6,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/live/mavlink_aiding.hpp"
 #include "fbvins/live/mavlink_peer.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/mavlink/vehicle_frames.hpp"
@@ -39,6 +41,8 @@ class MavlinkSession {
   /// Where M is, for poses in it (LocalOrigin::map).
   void take(const MapUpdate& update) { frames_.take(update); }
   Frames receive(std::span<const std::uint8_t> bytes, Time now);
+  /// Of the flight controller's sensors that the options name, since the last call, on this machine's clock.
+  std::vector<AidingSample> take_readings() { return std::exchange(readings_, {}); }
   /// What is due: heartbeats, TIMESYNC requests, a change of health.
   Frames tick(Time now);
   /// To be called when the port was reopened: drops a half-read frame, and sends the health again.
@@ -76,6 +80,8 @@ class MavlinkSession {
   std::unique_ptr<MavlinkSigner> signer_;
   VehicleFrames frames_;
   MavlinkDecoder decoder_;
+  MavlinkAiding aiding_;
+  std::vector<AidingSample> readings_;
   MavlinkPeer peer_;
   std::uint8_t sequence_ = 0;
   std::optional<Health> health_;  // of the newest status

@@ -79,6 +79,7 @@ struct MavlinkSink::Impl {
   void mind_signing_time();
   std::string problem(Time now);
   void publish(Time now);
+  void hand_on(const std::vector<AidingSample>& readings);
 
   const std::string name;
   // Used by the worker alone.
@@ -96,6 +97,8 @@ struct MavlinkSink::Impl {
   std::deque<Event> waiting;
   std::int64_t overrun = 0;
   MavlinkLinkState state;
+  std::mutex reading_mutex;  // guards on_reading, also while it runs
+  std::function<void(const AidingSample&)> on_reading;
   std::thread worker;  // last: starts when everything else exists
 };
 
@@ -160,6 +163,12 @@ void MavlinkSink::Impl::publish(Time now) {
   state.frames_dropped += overrun;
 }
 
+void MavlinkSink::Impl::hand_on(const std::vector<AidingSample>& readings) {
+  const std::lock_guard lock(reading_mutex);
+  for (const AidingSample& reading : readings)
+    if (on_reading) on_reading(reading), ++seen.readings;
+}
+
 void MavlinkSink::Impl::work() {
   for (bool last = false; !last;) {
     last = ending;  // what was taken before the end is still sent
@@ -178,6 +187,7 @@ void MavlinkSink::Impl::work() {
     const std::vector<std::uint8_t> bytes = link.receive();
     const Time now = host_now();
     send(session.receive(bytes, now));
+    hand_on(session.take_readings());
     mind_peer(now);
     mind_signing_time();
     send(session.tick(now));
@@ -215,13 +225,18 @@ Result<void> MavlinkSink::take(const LiveEvent& event) {
   return {};
 }
 
+void MavlinkSink::on_reading(std::function<void(const AidingSample&)> callback) {
+  const std::lock_guard lock(impl_->reading_mutex);
+  impl_->on_reading = std::move(callback);
+}
+
 std::string MavlinkSink::problem() const { return state().problem; }
 
 std::vector<OutputFigure> MavlinkSink::figures() const {
   const MavlinkLinkState s = state();
   return {{"connected", s.connected},           {"flight_controller", s.flight_controller}, {"clock_known", s.clock_known},
           {"clock_offset_s", s.clock_offset_s}, {"round_trip_ms", s.round_trip_ms},         {"poses_sent", s.poses_sent},
-          {"poses_withheld", s.poses_withheld}, {"frames_dropped", s.frames_dropped}};
+          {"poses_withheld", s.poses_withheld}, {"frames_dropped", s.frames_dropped}, {"readings", s.readings}};
 }
 
 Result<void> MavlinkSink::finish() {

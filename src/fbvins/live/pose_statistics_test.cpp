@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "fbvins/estimator/estimator.hpp"
-#include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/live/live_options.hpp"
 #include "fbvins/live/pose_propagator.hpp"
+#include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
 namespace pose_statistics_test {

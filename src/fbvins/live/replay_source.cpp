@@ -62,7 +62,7 @@ Result<void> ReplaySource::run(SensorInput& input) {
 bool ReplaySource::play(SensorInput& input, Duration later, const std::function<std::optional<SensorEvent>()>& next) {
   std::optional<SensorEvent> event = next();  // the first images are decoded before the clock starts
   for (; event; event = next()) {
-    Time& t = std::visit([](auto& e) -> Time& { return e.t; }, *event);
+    Time& t = stamp_of(*event);
     t = t + later;
     if (!first_) {
       first_ = t;

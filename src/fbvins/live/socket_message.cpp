@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "fbvins/core/overloaded.hpp"
 #include "fbvins/io/image_decode.hpp"
 
 namespace fbvins {
@@ -40,6 +41,7 @@ static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
 static_assert(sizeof(FbvinsSocketPosition) == 120 && sizeof(FbvinsSocketTag) == 304 && sizeof(FbvinsSocketDevice) == 2048);
+static_assert(sizeof(FbvinsSocketAiding) == 144);
 static_assert(sizeof(FbvinsSocketImu) <= FBVINS_SOCKET_LARGEST_MESSAGE);
 
 Error malformed(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
@@ -234,6 +236,22 @@ Result<SocketMessage> parse_tag(std::span<const std::byte> bytes) {
   return SocketMessage(usable ? SocketPosition{anchor} : SocketPosition{});
 }
 
+Result<SocketMessage> parse_aiding(std::span<const std::byte> bytes) {
+  const auto m = read<FbvinsSocketAiding>(bytes, "aiding");
+  if (!m) return m.error();
+  if (!is_stamp(m->t_ns)) return malformed(fmt::format("aiding: stamp {} ns", m->t_ns));
+  const Time t{m->t_ns};
+  AidingSample reading;
+  const Quat q_BS(m->q_BS[0], m->q_BS[1], m->q_BS[2], m->q_BS[3]);
+  if (m->sensor == FBVINS_SOCKET_RANGE)
+    reading = RangeSample{t, m->value[0], m->sigma[0], Vec3(m->p_BS), q_BS * Vec3::UnitX(), m->nearest_m, m->farthest_m};
+  else if (m->sensor == FBVINS_SOCKET_VELOCITY)
+    reading = VelocitySample{t, Vec3(m->value), Vec3(m->sigma), Vec3(m->p_BS), q_BS};
+  else if (m->sensor == FBVINS_SOCKET_PRESSURE) reading = PressureSample{t, m->value[0], m->sigma[0]};
+  else return malformed(fmt::format("aiding: sensor is {}, not 0 to 2", m->sensor));
+  return SocketMessage(impossible(reading).empty() ? SocketAiding{std::move(reading)} : SocketAiding{});
+}
+
 Result<SocketMessage> parse_device(std::span<const std::byte> bytes) {
   const auto device = read<FbvinsSocketDevice>(bytes, "device");
   if (!device) return device.error();
@@ -250,6 +268,33 @@ Result<SocketMessage> parse_goodbye(std::span<const std::byte> bytes) {
 
 }  // namespace
 
+FbvinsSocketAiding socket_aiding(const AidingSample& reading) {
+  FbvinsSocketAiding m{};
+  m.header = {FBVINS_SOCKET_AIDING, sizeof(m)};
+  m.t_ns = stamp_of(reading).ns;
+  const auto put = [](const auto& from, auto& to) { std::copy(from.data(), from.data() + from.size(), to); };
+  const auto put_place = [&](const Vec3& p, const Quat& q) {
+    put(p, m.p_BS);
+    const Eigen::Vector4d wxyz(q.w(), q.x(), q.y(), q.z());
+    put(wxyz, m.q_BS);
+  };
+  std::visit(Overloaded{[&](const RangeSample& r) {
+                          m.sensor = FBVINS_SOCKET_RANGE, m.value[0] = r.distance_m, m.sigma[0] = r.sigma_m;
+                          put_place(r.p_B, Quat::FromTwoVectors(Vec3::UnitX(), r.direction_B));
+                          m.nearest_m = r.nearest_m, m.farthest_m = r.farthest_m;
+                        },
+                        [&](const VelocitySample& r) {
+                          m.sensor = FBVINS_SOCKET_VELOCITY;
+                          put(r.v_mps, m.value), put(r.sigma_mps, m.sigma);
+                          put_place(r.p_B, r.q_BS);
+                        },
+                        [&](const PressureSample& r) {
+                          m.sensor = FBVINS_SOCKET_PRESSURE, m.value[0] = r.pressure_pa, m.sigma[0] = r.sigma_pa;
+                        }},
+             reading);
+  return m;
+}
+
 Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes) {
   const auto header = read<FbvinsSocketHeader>(bytes, "a message");
   if (!header) return header.error();
@@ -262,6 +307,7 @@ Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes) {
     case FBVINS_SOCKET_GOODBYE: return parse_goodbye(bytes);
     case FBVINS_SOCKET_POSITION: return parse_position(bytes);
     case FBVINS_SOCKET_TAG: return parse_tag(bytes);
+    case FBVINS_SOCKET_AIDING: return parse_aiding(bytes);
     case FBVINS_SOCKET_DEVICE: return parse_device(bytes);
     default: return SocketMessage(SocketUnknown{header->type});
   }

@@ -20,6 +20,7 @@
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/device_facts.hpp"
 #include "fbvins/live/socket_protocol.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/anchor.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
@@ -82,6 +83,10 @@ struct SocketPosition {
   std::optional<Anchor> anchor;  ///< none: left out, being impossible
 };
 
+struct SocketAiding {
+  std::optional<AidingSample> reading;  ///< none: left out, being impossible
+};
+
 struct SocketDevice {
   DeviceFacts facts;
 };
@@ -96,13 +101,15 @@ struct SocketUnknown {
 };
 
 using SocketMessage =
-    std::variant<SocketHello, SocketImu, SocketFrame, SocketPosition, SocketDevice, SocketGoodbye, SocketUnknown>;
+    std::variant<SocketHello, SocketImu, SocketFrame, SocketPosition, SocketAiding, SocketDevice, SocketGoodbye, SocketUnknown>;
 
 /// ErrorCode::unsupported: another major version; ErrorCode::malformed: anything else.
 Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);
 
 /// The rig of a hello, checked as calibration files are.
 Result<StereoRig> parse_socket_rig(const SocketRig& rig, int width_px, int height_px);
+/// The message of a reading, for our own senders and for tests.
+FbvinsSocketAiding socket_aiding(const AidingSample& reading);
 /// The reverse, for our own senders and for tests.
 SocketRig socket_rig(const StereoRig& rig);
 /// The calibration's fields and flags of a hello.

@@ -174,6 +174,35 @@ TEST(SocketMessage, PositionsAndHeights) {
   EXPECT_EQ(refusal(bytes_of(position, 40)), "a message of 40 bytes says that it has 120");
 }
 
+TEST(SocketMessage, ReadingsOfAidingSensors) {
+  RangeSample range{.t = Time{77}, .distance_m = 1.5, .sigma_m = 0.01, .p_B = Vec3(0.1, 0, 0.2), .direction_B = Vec3(0.6, 0, -0.8)};
+  VelocitySample velocity{.t = Time{78}, .v_mps = Vec3(1, 2, 3), .sigma_mps = Vec3(0.1, 0.2, kUnmeasured_mps)};
+  velocity.p_B = Vec3(-0.1, 0, 0), velocity.q_BS = so3_exp(Vec3(0, 0.3, 1));
+  const auto back = [](const AidingSample& reading) {
+    const auto message = parse_socket_message(bytes_of(socket_aiding(reading)));
+    EXPECT_TRUE(message);
+    return std::get<SocketAiding>(*message).reading;
+  };
+  const auto r = std::get<RangeSample>(*back(range));
+  EXPECT_EQ(r.t, range.t);
+  EXPECT_EQ(r.distance_m, 1.5);
+  EXPECT_EQ(r.p_B, range.p_B);
+  EXPECT_LT((r.direction_B - range.direction_B).norm(), 1e-12);
+  EXPECT_EQ(r.farthest_m, range.farthest_m);
+  const auto v = std::get<VelocitySample>(*back(velocity));
+  EXPECT_EQ(v.v_mps, velocity.v_mps);
+  EXPECT_EQ(v.sigma_mps, velocity.sigma_mps);
+  EXPECT_EQ(v.q_BS.coeffs(), velocity.q_BS.coeffs());
+  EXPECT_EQ(std::get<PressureSample>(*back(PressureSample{Time{79}, 99'000, 3})).pressure_pa, 99'000);
+  EXPECT_FALSE(back(PressureSample{Time{79}, -1, 3})) << "left out, and the connection stays";
+  FbvinsSocketAiding message = socket_aiding(range);
+  message.sensor = 3;
+  EXPECT_EQ(refusal(bytes_of(message)), "aiding: sensor is 3, not 0 to 2");
+  message.sensor = 0, message.t_ns = -1;
+  EXPECT_EQ(refusal(bytes_of(message)), "aiding: stamp -1 ns");
+  EXPECT_EQ(refusal(bytes_of(message, 40)), "a message of 40 bytes says that it has 144");
+}
+
 TEST(SocketMessage, ReadingsThatAreNotFiniteAreLeftOutAndCounted) {
   FbvinsSocketImu imu{};
   const auto size = static_cast<std::uint32_t>(offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading));

@@ -96,6 +96,7 @@ void SocketSession::take(const SocketMessage& message, SensorInput& input) {
     counts_.readings_refused += static_cast<std::uint64_t>(imu->refused);
   } else if (const auto* frame = std::get_if<SocketFrame>(&message)) take(*frame, input);
   else if (const auto* position = std::get_if<SocketPosition>(&message)) take(*position, input);
+  else if (const auto* aiding = std::get_if<SocketAiding>(&message)) take(*aiding, input);
   else if (const auto* device = std::get_if<SocketDevice>(&message)) device_ = device->facts;
   else if (const auto* goodbye = std::get_if<SocketGoodbye>(&message))
     ended_ = goodbye->text.empty() ? "said goodbye" : fmt::format("said goodbye: {}", goodbye->text);
@@ -106,6 +107,11 @@ void SocketSession::take(const SocketMessage& message, SensorInput& input) {
 
 void SocketSession::take(const SocketPosition& position, SensorInput& input) {
   if (position.anchor) input.push_anchor(*position.anchor);
+  else ++counts_.readings_refused;
+}
+
+void SocketSession::take(const SocketAiding& aiding, SensorInput& input) {
+  if (aiding.reading) input.push_aiding(*aiding.reading);
   else ++counts_.readings_refused;
 }
 

@@ -57,6 +57,7 @@ class SocketSession {
   std::optional<Packet> next_packet();
   void take_hello(const Packet& packet);
   void take(const SocketMessage& message, SensorInput& input);
+  void take(const SocketAiding& aiding, SensorInput& input);
   void take(const SocketPosition& position, SensorInput& input);
   void take(const SocketFrame& frame, SensorInput& input);
   void fail(const Error& error);

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/geometry/jacobian_check.hpp"
-#include "fbvins/imu/imu_test_motion.hpp"
+#include "tests/support/imu_test_motion.hpp"
+#include "tests/support/jacobian_check.hpp"
 
 namespace fbvins {
 namespace adjustment_costs_test {

@@ -10,7 +10,6 @@
 
 #include <cmath>
 #include <cstring>
-#include <span>
 #include <string>
 #include <string_view>
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/loop/map_front.hpp"

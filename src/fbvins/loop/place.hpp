@@ -2,7 +2,6 @@
 // What a map remembers of an image: descriptors, where they were seen, and how far away. Values.
 #pragma once
 
-#include <cmath>
 #include <vector>
 
 #include "fbvins/features/keypoint.hpp"

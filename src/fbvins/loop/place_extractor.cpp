@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/place_extractor.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "fbvins/core/median.hpp"

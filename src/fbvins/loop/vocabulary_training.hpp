@@ -6,7 +6,6 @@
 //   Vocabulary vocabulary = train_vocabulary("orb", descriptors_of_images, {});
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 

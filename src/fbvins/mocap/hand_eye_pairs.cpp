@@ -7,7 +7,6 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/geometry/heading.hpp"

@@ -2,7 +2,6 @@
 #include "fbvins/optim/schur.hpp"
 
 #include <Eigen/LU>
-#include <cmath>
 
 #include "fbvins/core/simd.hpp"
 

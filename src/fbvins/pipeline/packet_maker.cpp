@@ -10,7 +10,7 @@ namespace {
 constexpr Duration kMostCorrection{100'000'000};
 
 /// An older one has come late, or images were missing: the motion since is too long.
-constexpr Duration kOldestRange{150'000'000};
+constexpr Duration kOldestAiding{150'000'000};
 
 }  // namespace
 
@@ -29,10 +29,10 @@ void PacketMaker::push(Anchor anchor) {
   anchors_.push_back(std::move(anchor));
 }
 
-void PacketMaker::push(const RangeSample& reading) {
+void PacketMaker::push(const AidingSample& reading) {
   constexpr std::size_t kMost = 1024;  // where no images come
-  if (ranges_.size() >= kMost) ranges_.pop_front();
-  ranges_.push_back(reading);
+  if (aiding_.size() >= kMost) aiding_.pop_front();
+  aiding_.push_back(reading);
 }
 
 bool PacketMaker::is_ready(bool flush) const {
@@ -60,9 +60,9 @@ std::optional<SensorPacket> PacketMaker::next(bool flush) {
   packet.id = FrameId{next_frame_++};
   packet.frame = std::move(waiting_.front());
   packet.anchors = std::exchange(anchors_, {});
-  std::erase_if(ranges_, [&](const RangeSample& reading) {
-    if (reading.t > t) return false;
-    if (t - reading.t < kOldestRange) packet.ranges.push_back(reading);
+  std::erase_if(aiding_, [&](const AidingSample& reading) {
+    if (stamp_of(reading) > t) return false;
+    if (t - stamp_of(reading) < kOldestAiding) packet.aiding.push_back(reading);
     return true;
   });
   waiting_.pop_front();

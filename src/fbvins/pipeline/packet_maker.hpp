@@ -25,7 +25,7 @@ class PacketMaker {
   /// Goes with the next image that comes out.
   void push(Anchor anchor);
   /// Goes with the first image that comes out and is not older.
-  void push(const RangeSample& reading);
+  void push(const AidingSample& reading);
   /// The next image that is ready; with `flush`, the next image even if its readings never came.
   std::optional<SensorPacket> next(bool flush = false);
   /// The number of the next image, where one waits and could come out.
@@ -42,7 +42,7 @@ class PacketMaker {
   Duration given_, time_offset_;
   std::deque<StereoFrame> waiting_;
   std::vector<Anchor> anchors_;
-  std::deque<RangeSample> ranges_;
+  std::deque<AidingSample> aiding_;
   std::optional<Time> newest_image_;
   std::optional<Time> previous_;  ///< when the image before was taken, by the time offset of now
   std::int64_t next_frame_ = 0;

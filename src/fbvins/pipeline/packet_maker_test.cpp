@@ -99,16 +99,16 @@ TEST(PacketMaker, ARangeGoesWithTheFirstImageThatIsNotOlder) {
   for (const int ms : {0, 50, 100}) maker.push(image(ms));
   const auto packets = drain(maker);
   ASSERT_EQ(packets.size(), 3u);
-  EXPECT_TRUE(packets[0].ranges.empty());
-  ASSERT_EQ(packets[1].ranges.size(), 2u);
-  EXPECT_EQ(packets[1].ranges[1].t.ns, 50 * kMs);
-  ASSERT_EQ(packets[2].ranges.size(), 2u);
+  EXPECT_TRUE(packets[0].aiding.empty());
+  ASSERT_EQ(packets[1].aiding.size(), 2u);
+  EXPECT_EQ(stamp_of(packets[1].aiding[1]).ns, 50 * kMs);
+  ASSERT_EQ(packets[2].aiding.size(), 2u);
   range(80), range(99);  // late, but not too late
   maker.push(image(240));
   const auto later = drain(maker);
   ASSERT_EQ(later.size(), 1u);
-  ASSERT_EQ(later[0].ranges.size(), 1u) << "the other one is too old";
-  EXPECT_EQ(later[0].ranges[0].t.ns, 99 * kMs);
+  ASSERT_EQ(later[0].aiding.size(), 1u) << "the other one is too old";
+  EXPECT_EQ(stamp_of(later[0].aiding[0]).ns, 99 * kMs);
 }
 
 TEST(PacketMaker, TheTimeOffsetMovesTheReadingsAndNotTheImage) {

@@ -92,7 +92,7 @@ struct System::Impl {
         lenses(std::move(lenses_of_rig)),
         packet_maker(options.input, lenses.rig().imu_noise, Duration::from_seconds(lenses.rig().time_offset_s)),
         frontend(std::move(parts.frontend)),
-        estimator(lenses.rig(), options.estimator, parts.imu_state),
+        estimator(lenses.rig(), options.estimator, parts.imu_state, parts.sensors),
         mapper(parts.mapper),
         imu_model{{}, {}, options.estimator.assumed(lenses.rig().imu_noise), options.estimator.gravity_mps2} {
     if (mode == RunMode::deterministic) return;
@@ -117,7 +117,7 @@ struct System::Impl {
     frame.offsets = packet.frame.offsets;
     frame.after_clock_step = packet.frame.after_clock_step;
     frame.anchors = std::move(packet.anchors);
-    frame.ranges = std::move(packet.ranges);
+    frame.aiding = std::move(packet.aiding);
     if (keyframes_wanted()) frame.images = std::move(images);
     hand_on(estimation, std::move(frame));
   }
@@ -172,7 +172,7 @@ struct System::Impl {
     packet_maker.push(std::move(frame));
   }
 
-  Result<void> push(const RangeSample& reading) {
+  Result<void> push(const AidingSample& reading) {
     if (const std::string why = impossible(reading); !why.empty()) return Error{ErrorCode::invalid_argument, why};
     packet_maker.push(reading);
     return {};
@@ -276,7 +276,7 @@ Result<void> System::push(SensorEvent event) {
     return Error{ErrorCode::invalid_argument, "push() after finish(): the system has ended"};
   const Result<void> taken = std::visit(Overloaded{[this](ImuSample& sample) { return impl_->packet_maker.push(sample), Result<void>{}; },
                                                    [this](StereoFrame& frame) { return impl_->push(std::move(frame)), Result<void>{}; },
-                                                   [this](const RangeSample& reading) { return impl_->push(reading); }},
+                                                   [this](const AidingSample& reading) { return impl_->push(reading); }},
                                         event);
   if (!taken) return taken;
   impl_->forward(false);

@@ -72,7 +72,7 @@ MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEve
   });
   std::size_t next = 0;
   for (const SensorEvent& event : events) {
-    const Time t = std::visit([](const auto& e) { return e.t; }, event);
+    const Time t = stamp_of(event);
     for (; next < anchors.size() && stamp_of(anchors[next]) <= t; ++next) EXPECT_TRUE(system.push(anchors[next]));
     EXPECT_TRUE(system.push(event));
   }

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a RealSense camera says of itself: realsense_facts(), is_calibrated().
-#include <algorithm>
-#include <cmath>
 
 #include "fbvins/realsense/realsense_camera.hpp"
 

@@ -332,7 +332,7 @@ TEST(Realsense, FliesARecordedFlight) {
     const auto begin = std::chrono::steady_clock::now();
     std::optional<Time> first;
     while (auto event = (*dataset)->next()) {
-      const Time t = std::visit([](const auto& e) { return e.t; }, *event);
+      const Time t = stamp_of(*event);
       if (!first) first = t;
       if (t - *first > Duration::from_seconds(12)) break;
       std::this_thread::sleep_until(begin + std::chrono::nanoseconds((t - *first).ns));

@@ -34,6 +34,8 @@ std::string_view to_string(HealthReason reason) {
     case HealthReason::imu_vibration: return "imu_vibration";
     case HealthReason::correction_pending: return "correction_pending";
     case HealthReason::range_disagrees: return "range_disagrees";
+    case HealthReason::velocity_disagrees: return "velocity_disagrees";
+    case HealthReason::pressure_disagrees: return "pressure_disagrees";
   }
   return "unknown";
 }

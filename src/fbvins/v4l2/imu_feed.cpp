@@ -86,6 +86,7 @@ class SocketFeed final : public ImuFeed {
       explicit ReadingsOnly(SensorInput& input) : all(input) {}
       void push(const ImuSample& sample) override { all.push(sample); }
       void push(StereoFrame) override {}
+      void push_aiding(const AidingSample& reading) override { all.push_aiding(reading); }
       SensorInput& all;
     } readings(input);
     return source_->run(readings);

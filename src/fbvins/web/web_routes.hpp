@@ -2,7 +2,6 @@
 // Private: the server's answers to requests. Pure, without a socket; any thread.
 #pragma once
 
-#include <string>
 #include <string_view>
 
 #include "fbvins/web/web_server.hpp"

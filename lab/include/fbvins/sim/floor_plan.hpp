@@ -2,7 +2,6 @@
 // Floor plan: axis-parallel rectangles that overlap at doors. Values.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "fbvins/geometry/so3.hpp"

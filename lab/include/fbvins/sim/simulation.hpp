@@ -20,7 +20,9 @@
 #include "fbvins/sim/image_sensor.hpp"
 #include "fbvins/sim/imu_model.hpp"
 #include "fbvins/sim/lighting.hpp"
+#include "fbvins/sim/pressure_model.hpp"
 #include "fbvins/sim/range_model.hpp"
+#include "fbvins/sim/velocity_model.hpp"
 #include "fbvins/sim/world.hpp"
 
 namespace fbvins {
@@ -81,6 +83,8 @@ struct SimulationOptions {
   CalibrationErrorOptions calibration_error;
   DepthModelOptions depth;
   RangeModelOptions range;
+  VelocityModelOptions velocity;
+  PressureModelOptions barometer;
   WorldOptions world;
   LightOptions light;
 
@@ -101,6 +105,8 @@ struct SimulationOptions {
     v.group("calibration_error", calibration_error, "the calibration that the recording is written with, against the true one");
     v.group("depth", depth, "the depth sensor of the rig rgbd");
     v.group("range", range, "a rangefinder that looks down");
+    v.group("velocity", velocity, "a sensor of velocity");
+    v.group("barometer", barometer, "a barometer");
     v.group("world", world, "the place");
     v.group("light", light, "the lamps");
   }
@@ -139,7 +145,7 @@ struct Simulation {
   SplineTrajectory flight;
   Time start;
   SimulatedImu imu;
-  std::vector<RangeSample> ranges = {};
+  std::vector<AidingSample> aiding = {};  ///< in order of stamps
   std::vector<Time> frames;               ///< stamps of the images, on the IMU's clock
   Vec3 world_from_flight = Vec3::Zero();  ///< added to the flight's positions: a recorded one has its origin anywhere
   std::shared_ptr<const World> world;

@@ -6,7 +6,6 @@
 //   std::vector<Facet> now = world.facets;   append_movers(world, t, now)
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
