@@ -209,10 +209,16 @@ std::optional<BlockSolution> StereoProblem::converge() {
   return last;
 }
 
-/// No focal length is wrong by a third: such a fit explains something else than a wrong calibration.
+/// No focal length is wrong by a third, no principal point lies near the image's edge, and no lens is another kind's: such a fit
+/// explains something else than a wrong calibration. Rays that a distortion draws together all err less.
 bool StereoProblem::plausible() const {
-  constexpr double kMostLogFocal = 0.3;
-  return std::max({std::abs(x(kLeft)), std::abs(x(kRight)), std::abs(x(kBoth))}) < kMostLogFocal;
+  constexpr double kMostLogFocal = 0.3, kMostRadial[] = {1, 3}, kMostOffCentre = 0.25;
+  for (const int lens : {kLeft, kRight, kBoth}) {
+    const double off_centre_px = x.segment<2>(lens + kCentre).norm();
+    if (std::abs(x(lens + kFocal)) >= kMostLogFocal || off_centre_px >= kMostOffCentre * rig_->left.width()) return false;
+    if (std::abs(x(lens + kRadial)) >= kMostRadial[0] || std::abs(x(lens + kRadial + 1)) >= kMostRadial[1]) return false;
+  }
+  return true;
 }
 
 double StereoProblem::capped_error() const {
