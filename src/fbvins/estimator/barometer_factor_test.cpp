@@ -10,7 +10,7 @@
 #include "fbvins/core/rng.hpp"
 #include "fbvins/estimator/factor_test.hpp"
 #include "fbvins/estimator/height_factor.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace barometer_factor_test {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "fbvins/estimator/factor_test.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace own_sensor_factor_test {

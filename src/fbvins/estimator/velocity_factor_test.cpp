@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "fbvins/estimator/factor_test.hpp"
-#include "fbvins/estimator/window_test_scene.hpp"
+#include "tests/support/window_test_scene.hpp"
 
 namespace fbvins {
 namespace velocity_factor_test {
