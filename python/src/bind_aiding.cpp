@@ -12,7 +12,9 @@
 namespace fbvins::python {
 namespace {
 
-Vec3 vector_or(nb::handle value, const char* name, const Vec3& otherwise) { return value.is_none() ? otherwise : vector3(value, name); }
+Vec3 vector_or(nb::handle value, const char* name, const Vec3& otherwise) {
+  return value.is_none() ? otherwise : vector3(value, name);
+}
 
 Quat axes_of(nb::handle wxyz) {
   if (wxyz.is_none()) return Quat::Identity();
@@ -36,16 +38,22 @@ void bind_common(nb::class_<Sample>& bound, const char* name) {
 }
 
 void bind_range(nb::module_& m) {
-  nb::class_<RangeSample> bound(m, "RangeSample",
-                                "A reading of a rangefinder, for System.push(): distance in m along a beam that begins at point and "
-                                "points along direction, both (3,) in B, None: the origin, and down along -z. distance may be inf, "
-                                "where it sees nothing. ValueError for one that cannot be.");
+  nb::class_<RangeSample> bound(
+      m, "RangeSample",
+      "A reading of a rangefinder, for System.push(): distance in m along a beam that begins at point and "
+      "points along direction, both (3,) in B, None: the origin, and down along -z. distance may be inf, "
+      "where it sees nothing. ValueError for one that cannot be.");
   bound.def(
       "__init__",
       [](RangeSample* at, nb::handle t, double distance, double sigma, nb::handle point, nb::handle direction, double nearest,
          double farthest) {
-        RangeSample r{Time{whole_number(t, "t")}, distance, sigma, vector_or(point, "point", Vec3::Zero()),
-                      vector_or(direction, "direction", -Vec3::UnitZ()), nearest, farthest};
+        RangeSample r{Time{whole_number(t, "t")},
+                      distance,
+                      sigma,
+                      vector_or(point, "point", Vec3::Zero()),
+                      vector_or(direction, "direction", -Vec3::UnitZ()),
+                      nearest,
+                      farthest};
         new (at) RangeSample(possible(r));
       },
       "t"_a, "distance"_a, "sigma"_a = 0.02, "point"_a.none() = nb::none(), "direction"_a.none() = nb::none(), "nearest"_a = 0.1,
@@ -61,16 +69,18 @@ void bind_range(nb::module_& m) {
 }
 
 void bind_velocity(nb::module_& m) {
-  nb::class_<VelocitySample> bound(m, "VelocitySample",
-                                   "A reading of a sensor of velocity (wheels, optical flow), for System.push(): velocity (3,) in m/s "
-                                   "in the sensor's axes, sigma (3,) the standard deviations along them, 100 for one that is not "
-                                   "measured; point (3,) in m where it sits in B, orientation (4,) w, x, y, z takes its axes to B's. "
-                                   "ValueError for one that cannot be.");
+  nb::class_<VelocitySample> bound(
+      m, "VelocitySample",
+      "A reading of a sensor of velocity (wheels, optical flow), for System.push(): velocity (3,) in m/s "
+      "in the sensor's axes, sigma (3,) the standard deviations along them, 100 for one that is not "
+      "measured; point (3,) in m where it sits in B, orientation (4,) w, x, y, z takes its axes to B's. "
+      "ValueError for one that cannot be.");
   bound.def(
       "__init__",
       [](VelocitySample* at, nb::handle t, nb::handle velocity, nb::handle sigma, nb::handle point, nb::handle orientation) {
-        VelocitySample v{Time{whole_number(t, "t")}, vector3(velocity, "velocity"), vector_or(sigma, "sigma", VelocitySample{}.sigma_mps),
-                         vector_or(point, "point", Vec3::Zero()), axes_of(orientation)};
+        VelocitySample v{Time{whole_number(t, "t")}, vector3(velocity, "velocity"),
+                         vector_or(sigma, "sigma", VelocitySample{}.sigma_mps), vector_or(point, "point", Vec3::Zero()),
+                         axes_of(orientation)};
         new (at) VelocitySample(possible(v));
       },
       "t"_a, "velocity"_a, "sigma"_a.none() = nb::none(), "point"_a.none() = nb::none(), "orientation"_a.none() = nb::none(),
@@ -86,9 +96,10 @@ void bind_velocity(nb::module_& m) {
 }
 
 void bind_pressure(nb::module_& m) {
-  nb::class_<PressureSample> bound(m, "PressureSample",
-                                   "A reading of a barometer, for System.push(): pressure and its standard deviation in Pa. ValueError "
-                                   "for one that cannot be.");
+  nb::class_<PressureSample> bound(
+      m, "PressureSample",
+      "A reading of a barometer, for System.push(): pressure and its standard deviation in Pa. ValueError "
+      "for one that cannot be.");
   bound.def(
       "__init__",
       [](PressureSample* at, nb::handle t, double pressure, double sigma) {

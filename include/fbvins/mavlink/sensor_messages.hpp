@@ -37,7 +37,7 @@ struct OpticalFlowRadMessage {
 
   std::uint64_t time_usec = 0;
   std::uint32_t integration_time_us = 0;
-  float integrated_x = 0, integrated_y = 0;                             ///< rad about the axes, the turn's part included
+  float integrated_x = 0, integrated_y = 0;                                ///< rad about the axes, the turn's part included
   float integrated_xgyro = 0, integrated_ygyro = 0, integrated_zgyro = 0;  ///< rad
   std::uint32_t time_delta_distance_us = 0;
   float distance = -1;           ///< m, to the centre of the flow; negative: not known

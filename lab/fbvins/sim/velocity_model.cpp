@@ -21,7 +21,8 @@ std::vector<VelocitySample> simulate_velocities(const SplineTrajectory& flight, 
   bool slips = false;
   for (int k = 0; k / o.rate_hz < flight.duration_s(); ++k) {
     const double t = k / o.rate_hz;
-    if (k == 0 || std::floor(t / kPiece_s) != std::floor((k - 1) / o.rate_hz / kPiece_s)) slips = rng.uniform(0, 1) < o.wrong_share;
+    if (k == 0 || std::floor(t / kPiece_s) != std::floor((k - 1) / o.rate_hz / kPiece_s))
+      slips = rng.uniform(0, 1) < o.wrong_share;
     const MotionState at = flight.at(t);
     const Vec3 v_B = at.T_WB.q.conjugate() * at.v_WB + at.w_WB_B.cross(sensor.p_B);
     VelocitySample reading = sensor;

@@ -19,9 +19,10 @@ Result<std::vector<AidingSample>> aiding_on(const BagContents& contents, const s
   const std::string body = of_imu == contents.imu.end() ? std::string() : of_imu->second.frame;
   const auto T_BS = find_transform(contents.transforms, body, topic.frame);
   if (!T_BS)
-    return Error{ErrorCode::not_found,
-                 fmt::format("the place of the sensor of {} is not known: no transform on /tf_static takes '{}' to the IMU's '{}'",
-                             printable(name), printable(topic.frame), printable(body))};
+    return Error{
+        ErrorCode::not_found,
+        fmt::format("the place of the sensor of {} is not known: no transform on /tf_static takes '{}' to the IMU's '{}'",
+                    printable(name), printable(topic.frame), printable(body))};
   for (AidingSample& reading : out) reading = mounted(reading, *T_BS);
   return out;
 }

@@ -7,8 +7,8 @@
 
 namespace fbvins {
 
-/// Fills `out` with those on the chosen topics, each where its sensor sits. An error where the bag does not know its place; warnings
-/// name what is there and not used.
+/// Fills `out` with those on the chosen topics, each where its sensor sits. An error where the bag does not know its place;
+/// warnings name what is there and not used.
 Result<void> read_aiding(const BagContents& contents, const ChosenTopics& topics, DatasetContents& out);
 
 }  // namespace fbvins

@@ -52,7 +52,8 @@ TEST(BagAiding, ItsPlaceIsThatOfItsFrame) {
   const auto lost = read_aiding(bag, *chosen, out);
   ASSERT_FALSE(lost);
   EXPECT_NE(lost.error().message.find("/tf_static"), std::string::npos) << lost.error().message;
-  bag.transforms = {{"base", "imu", Quat::Identity(), Vec3(0, 0, 0.1)}, {"base", "laser", so3_exp(Vec3(0, std::acos(0.0), 0)), Vec3(0.2, 0, 0)}};
+  bag.transforms = {{"base", "imu", Quat::Identity(), Vec3(0, 0, 0.1)},
+                    {"base", "laser", so3_exp(Vec3(0, std::acos(0.0), 0)), Vec3(0.2, 0, 0)}};
   ASSERT_TRUE(read_aiding(bag, *chosen, out));
   const auto& beam = std::get<RangeSample>(out.aiding.at(0));
   EXPECT_LT((beam.p_B - Vec3(0.2, 0, -0.1)).norm(), 1e-12);
@@ -70,7 +71,8 @@ TEST(BagAiding, OurOwnBagsKeepIt) {
   rig.left = rig.right = Camera(PinholeRadtan{90, 91, 40, 30, 0, 0, 0, 0}, 80, 60);
   rig.T_BC1.p = Vec3(0.1, 0, 0);
   rig.time_offset_s = 0.02;
-  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / ("aiding_" + std::to_string(getpid()) + ".bag");
+  const std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) / ("aiding_" + std::to_string(getpid()) + ".bag");
   auto bag = Ros1BagWriter::create(file.string(), rig, kT);
   ASSERT_TRUE(bag) << bag.error().message;
   const auto image = std::make_shared<const Image>(80, 60);

@@ -11,10 +11,10 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kRequestEvery{2'000'000'000};
+constexpr Duration kAskEvery{2'000'000'000};
 /// Stamps further from their arrival are of a clock that is not known.
-constexpr Duration kFarthest{1'000'000'000};
-constexpr std::uint64_t kLatestClock_usec = 3'800'000'000'000'000;
+constexpr Duration kFarthestStamp{1'000'000'000};
+constexpr std::uint64_t kLastClock_usec = 3'800'000'000'000'000;
 
 /// Where a sensor of that orientation looks, forward-right-down; none for one that is not known.
 std::optional<Vec3> direction_F(const DistanceSensorMessage& m) {
@@ -80,7 +80,7 @@ std::optional<AidingSample> MavlinkAiding::as_reading(const MavlinkMessage& mess
     return range_of(*range, T_BF_, unwrapped(range->time_boot_ms, now_theirs));
   }
   if (const auto* flow = std::get_if<OpticalFlowRadMessage>(&message); flow != nullptr && options_.flow) {
-    if (flow->time_usec > kLatestClock_usec) return std::nullopt;
+    if (flow->time_usec > kLastClock_usec) return std::nullopt;
     return velocity_of(*flow, T_BF_, Time{static_cast<std::int64_t>(flow->time_usec) * 1000});
   }
   if (const auto* pressure = std::get_if<ScaledPressureMessage>(&message); pressure != nullptr && options_.pressure)
@@ -93,14 +93,14 @@ std::optional<AidingSample> MavlinkAiding::read(const MavlinkMessage& message, D
   if (!reading || !impossible(*reading).empty()) return std::nullopt;
   wanted_[reading->index()].newest = now;
   stamp_of(*reading) = stamp_of(*reading) - offset;
-  if (std::abs((stamp_of(*reading) - now).ns) > kFarthest.ns) return std::nullopt;
+  if (std::abs((stamp_of(*reading) - now).ns) > kFarthestStamp.ns) return std::nullopt;
   return reading;
 }
 
 std::vector<CommandMessage> MavlinkAiding::requests(const MavlinkAddress& to, Time now) {
   std::vector<CommandMessage> out;
   for (Wanted& w : wanted_)
-    if (w.wanted && now - w.newest > kRequestEvery && is_due(now, kRequestEvery, w.next_request))
+    if (w.wanted && now - w.newest > kAskEvery && is_due(now, kAskEvery, w.next_request))
       out.push_back(request(w.message, options_.rate_hz, to));
   return out;
 }

@@ -9,7 +9,7 @@ namespace fbvins {
 namespace mavlink_aiding_test {
 
 constexpr Time kNow{50'000'000'000};
-constexpr Duration kOffset{7'000'000'000};  // the flight controller's clock is ahead
+constexpr Duration kOffset{7'000'000'000};    // the flight controller's clock is ahead
 constexpr std::uint32_t kTheirs_ms = 56'990;  // 10 ms ago
 
 MavlinkAiding all(int orientation = 25, ImuAxes axes = ImuAxes::flu) {

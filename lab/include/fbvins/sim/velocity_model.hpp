@@ -22,12 +22,13 @@ struct VelocityModelOptions {
     v("noise_mps", noise_mps, "m/s", "standard deviation of a reading along each axis", 0.0, 10.0);
     v("scale_error", scale_error, "", "all readings are too large by this share, 0.01 is 1 %", -0.5, 0.5);
     v("vertical", vertical, "", "it measures upwards, too, not ahead and aside alone");
-    v("wrong_share", wrong_share, "", "share of the time, in pieces of a second, in which it slips: readings are half too large", 0.0, 1.0);
+    v("wrong_share", wrong_share, "", "share of the time, in pieces of a second, in which it slips: readings are half too large",
+      0.0, 1.0);
   }
 };
 
 /// Readings 10 cm below the body, in the vehicle's axes (`R_BV`: x ahead and z up, in B). Stamps are the truth's.
-std::vector<VelocitySample> simulate_velocities(const SplineTrajectory& flight, const Mat3& R_BV, const VelocityModelOptions& options,
-                                                Time start, std::uint64_t seed);
+std::vector<VelocitySample> simulate_velocities(const SplineTrajectory& flight, const Mat3& R_BV,
+                                                const VelocityModelOptions& options, Time start, std::uint64_t seed);
 
 }  // namespace fbvins
