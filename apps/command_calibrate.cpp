@@ -134,7 +134,7 @@ Result<std::unique_ptr<GuidedCalibration>> guided(const Arguments& a, const Boar
   return GuidedCalibration::open(std::move(options));
 }
 
-Result<Material> gather(const Arguments& a, const Board& board, GuidedCalibration* live) {
+Result<Material> collect(const Arguments& a, const Board& board, GuidedCalibration* live) {
   Material out;
   if (live != nullptr) {
     Result<GuidedRecording> recorded = live->record();
@@ -225,7 +225,7 @@ int calibrate_live(const Arguments& a, const Board& board) {
   const StopSignals signals;  // before any thread is made
   const auto live = guided(a, board);
   if (!live) return fail(live.error().message);
-  const Result<Material> material = gather(a, board, live->get());
+  const Result<Material> material = collect(a, board, live->get());
   if (!material) {
     (*live)->end("failed", material.error().message);
     return fail(material.error().message);
@@ -246,7 +246,7 @@ int calibrate(const Arguments& a) {
   if (!board) return fail(board.error().message);
   if (Result<void> made = make_folders(a.out); !made) return fail(made.error().message);
   if (!a.source.empty()) return calibrate_live(a, *board);
-  const Result<Material> material = gather(a, *board, nullptr);
+  const Result<Material> material = collect(a, *board, nullptr);
   if (!material) return fail(material.error().message);
   if (material->stopped_after >= 0) {
     fail(fmt::format("interrupted after {} images: the same command goes on from there", material->stopped_after));

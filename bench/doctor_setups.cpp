@@ -15,17 +15,17 @@
 
 #include "bench/spoilt_recording.hpp"
 #include "fbvins/doctor/common_mistakes.hpp"
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/collect.hpp"
 
 namespace {
 
 using namespace fbvins;
 using namespace fbvins::bench;
 
-Result<Evidence> gather(const std::string& path) {
+Result<Evidence> collect(const std::string& path) {
   auto data = open_dataset(path);
   if (!data) return data.error();
-  EvidenceGatherer gatherer((*data)->rig());
+  EvidenceCollector gatherer((*data)->rig());
   while (auto event = (*data)->next())
     if (!gatherer.push(*event)) break;
   return gatherer.finish();
@@ -42,7 +42,7 @@ std::string all_of(const Diagnosis& diagnosis) {
 int good(int count, char** paths) {
   int alarms = 0;
   for (int i = 0; i < count; ++i) {
-    const auto evidence = gather(paths[i]);
+    const auto evidence = collect(paths[i]);
     if (!evidence) return fmt::print(stderr, "{}\n", evidence.error().message), 2;
     const Diagnosis diagnosis = examine(*evidence);
     fmt::print("| {} | {} | {} |\n", paths[i], diagnosis.findings.size(), diagnosis.not_judged.size());
@@ -95,7 +95,7 @@ bool judge(const Recorded& good, const Evidence& clean, const Fault& fault, cons
 int wrong(const std::string& path, const std::string& word, const Rows& rows) {
   const Result<Recorded> good = record(path);
   if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
-  const auto clean = gather(path);
+  const auto clean = collect(path);
   if (!clean) return fmt::print(stderr, "{}\n", clean.error().message), 2;
   const std::vector<SetupFault> all = setup_faults(good->rig);
   bool failed = false;

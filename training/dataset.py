@@ -30,7 +30,7 @@ class Views:
     def keep(self, index):
         """Keeps the keypoints at index (B, K)."""
         def take(x):
-            return x.gather(1, index.reshape(*index.shape, *[1] * (x.dim() - 2)).expand(-1, -1, *x.shape[2:]))
+            return x.collect(1, index.reshape(*index.shape, *[1] * (x.dim() - 2)).expand(-1, -1, *x.shape[2:]))
         self.margins, self.bits, self.keypoints, self.valid = map(take, (self.margins, self.bits, self.keypoints, self.valid))
 
 

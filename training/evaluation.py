@@ -15,7 +15,7 @@ def mutual_matches(bits_a, bits_b, both):
     order = torch.arange(n, dtype=d.dtype) / (4 * n)
     ab = (d + order[None, None, :]).argmin(2)
     ba = (d + order[None, :, None]).argmin(1)
-    mutual = ba.gather(1, ab) == torch.arange(n)[None]
+    mutual = ba.collect(1, ab) == torch.arange(n)[None]
     valid = both.any(2)
     return torch.where(mutual & valid, ab, torch.full_like(ab, -1))
 
@@ -27,7 +27,7 @@ def boosted_bits(model, views):
 
 def count_correct(bits_a, bits_b, batch, tolerance_px=3.0):
     match = mutual_matches(bits_a, bits_b, batch.both)
-    apart = batch.apart().gather(2, match.clamp(min=0)[..., None])[..., 0]
+    apart = batch.apart().collect(2, match.clamp(min=0)[..., None])[..., 0]
     found = match >= 0
     return (found & (apart < tolerance_px)).sum(1), found.sum(1)
 

@@ -125,7 +125,7 @@ class Prepared:
         generator = torch.Generator().manual_seed(a.seed * 1000003 + step)
         self.batch = Batch(np.stack([files[f][i] for f, i in where[pick]]))
         index = thin_out(self.batch.a, a.keypoints, generator)
-        self.batch.in_b = self.batch.in_b.gather(1, index[..., None].expand(-1, -1, 2))
+        self.batch.in_b = self.batch.in_b.collect(1, index[..., None].expand(-1, -1, 2))
         thin_out(self.batch.b, a.keypoints, generator)
         self.geometry = [geometry_of(as_if_moved(v, generator), v.width, v.height, v.valid) for v in (self.batch.a, self.batch.b)]
 

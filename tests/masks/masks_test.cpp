@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "fbvins/doctor/doctor.hpp"
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/collect.hpp"
 #include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/simulation.hpp"
 
@@ -23,7 +23,7 @@ Diagnosis diagnosis_of(const char* preset, int seed, double seconds, int legs) {
   Result<DatasetContents> contents = simulate(options);
   EXPECT_TRUE(contents.ok());
   Dataset data(*std::move(contents), {});
-  EvidenceGatherer gatherer(data.rig());
+  EvidenceCollector gatherer(data.rig());
   while (auto event = data.next())
     if (!gatherer.push(*event)) break;
   return examine(gatherer.finish());

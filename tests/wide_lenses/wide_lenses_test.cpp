@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 #include "fbvins/config/config.hpp"
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/pipeline/system.hpp"

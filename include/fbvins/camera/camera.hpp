@@ -67,7 +67,7 @@ class Camera {
   /// The same camera behind another lens.
   Camera with_lens(LensModel model) const;
   /// The same camera in axes that are turned inside its lens: its frame F with p_lens = R_lens * p_F, in which all that follows
-  /// is meant. Such a camera sees its own half space, what is behind the lens' plane included (lens_faces.hpp).
+  /// is meant. Such a camera sees its own half space, what is behind the lens' plane included (virtual_pinholes.hpp).
   Camera turned(const Mat3& R_lens) const;
 
   /// Pixel of normalised coordinates (x/z, y/z); not finite where a turned camera's lens has none.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <future>
 
-#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
@@ -60,7 +60,7 @@ FlightRecorder::Eye FlightRecorder::make_eye(const MountedCamera& mounted, doubl
 }
 
 /// Sums the radiance over an exposure that is centred at t.
-void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples) {
+void FlightRecorder::collect(Eye& eye, double t_s, double exposure_s, int samples) {
   for (Face& face : eye.faces) face.renderer.begin();
   for (int i = 0; i < samples; ++i) {
     const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
@@ -126,11 +126,11 @@ void FlightRecorder::add_instant(Eye& eye, double t_s, int sample, int samples) 
 Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {
   eye.sensor.allow_longer(intervals_.longer(t_s));
   if (!eye.settled) {
-    gather(eye, t_s, 0, 1);
+    collect(eye, t_s, 0, 1);
     eye.sensor.settle(eye.radiance);
     eye.settled = true;
   }
-  gather(eye, t_s, eye.sensor.exposure_s(), options_.camera.time_samples);
+  collect(eye, t_s, eye.sensor.exposure_s(), options_.camera.time_samples);
   return eye.sensor.expose(eye.radiance, frame);
 }
 
@@ -146,7 +146,7 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
   if (depth_) {
     std::vector<float> exact_m;
     Eye& eye = depth_eye_ ? *depth_eye_ : eyes_.front();
-    gather(eye, t_s, 0, 1);
+    collect(eye, t_s, 0, 1);
     eye.faces.front().renderer.depth(exact_m);
     rendered.frame.depth = std::make_shared<const DepthImage>(depth_->measure(exact_m, frame));
   }

@@ -52,7 +52,7 @@ class FlightRecorder {
     bool settled = false;
   };
   Eye make_eye(const MountedCamera& mounted, double gain, std::uint64_t seed) const;
-  void gather(Eye& eye, double t_s, double exposure_s, int samples);
+  void collect(Eye& eye, double t_s, double exposure_s, int samples);
   static void join_faces(Eye& eye);
   std::vector<Instant::Strip> strips_of(const Eye& eye, const Face& face, double first_line_s) const;
   void add_instant(Eye& eye, double t_s, int sample, int samples);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pieces that a Furnisher puts into a room (furnish.hpp), each turned and sized at random.
+// The pieces that a RoomPopulator puts into a room (populate_room.hpp), each turned and sized at random.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/sim/furnish.hpp"
+#include "fbvins/sim/populate_room.hpp"
 
 namespace fbvins {
 namespace {
@@ -15,7 +15,7 @@ Quat about_z(double angle) { return so3_exp(Vec3(0, 0, angle)); }
 
 }  // namespace
 
-bool Furnisher::add_shelf(const Wall& wall, double at) {
+bool RoomPopulator::add_shelf(const Wall& wall, double at) {
   const Vec3 x = wall.along.normalized();
   const double width = rng_.uniform(0.6, 1.2), depth = 0.17,
                height = std::min(rng_.uniform(1.0, 2.1), world_.plan.height_m - 0.2);
@@ -30,7 +30,7 @@ bool Furnisher::add_shelf(const Wall& wall, double at) {
   return true;
 }
 
-bool Furnisher::add_table(const Vec3& floor_point) {
+bool RoomPopulator::add_table(const Vec3& floor_point) {
   const double w = rng_.uniform(0.4, 0.8), d = rng_.uniform(0.3, 0.45), h = rng_.uniform(0.65, 0.8);
   if (!is_clear(floor_point + Vec3(0, 0, h), std::hypot(w, d) + 0.2)) return false;
   const Quat q = about_z(rng_.uniform(0, kPi));
@@ -51,7 +51,7 @@ bool Furnisher::add_table(const Vec3& floor_point) {
   return true;
 }
 
-bool Furnisher::add_box_stack(const Vec3& floor_point) {
+bool RoomPopulator::add_box_stack(const Vec3& floor_point) {
   double z = 0;
   for (int i = 1 + static_cast<int>(rng_.below(3)); i > 0; --i) {
     const double a = std::exp(rng_.uniform(std::log(0.1), std::log(0.4))), b = a * rng_.uniform(0.6, 1.5),
@@ -69,7 +69,7 @@ bool Furnisher::add_box_stack(const Vec3& floor_point) {
 
 /// Thin rods that cross one another, as in plants, tripods and stacked chairs: what is seen between them changes with
 /// every step.
-bool Furnisher::add_tangle(const Vec3& floor_point) {
+bool RoomPopulator::add_tangle(const Vec3& floor_point) {
   const double height = rng_.uniform(0.5, 1.7), foot = rng_.uniform(0.05, 0.2), crown = rng_.uniform(0.15, 0.45);
   for (double z = 0; z < height; z += 0.3)
     if (!is_clear(floor_point + Vec3(0, 0, z), crown)) return false;
@@ -87,7 +87,7 @@ bool Furnisher::add_tangle(const Vec3& floor_point) {
   return true;
 }
 
-bool Furnisher::add_pillar(const Vec3& floor_point) {
+bool RoomPopulator::add_pillar(const Vec3& floor_point) {
   const double h = 0.5 * world_.plan.height_m;
   for (double z = 0; z < 2 * h; z += 0.4)
     if (!is_clear(floor_point + Vec3(0, 0, z), 0.25)) return false;
@@ -97,7 +97,7 @@ bool Furnisher::add_pillar(const Vec3& floor_point) {
 }
 
 /// Pipes and ducts along a wall under the ceiling, and a vertical one.
-void Furnisher::add_pipes(const Wall& wall) {
+void RoomPopulator::add_pipes(const Wall& wall) {
   const Vec3 x = wall.along.normalized(), foot(wall.corner.x(), wall.corner.y(), 0);
   const Quat q = about_z(std::atan2(x.y(), x.x()));
   const int what = plain_or({Surface::metal, Surface::wood});

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "fbvins/sim/furnish.hpp"
+#include "fbvins/sim/populate_room.hpp"
 
 namespace fbvins {
 namespace room_changes_test {

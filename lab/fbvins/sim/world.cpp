@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/sim/furnish.hpp"
+#include "fbvins/sim/populate_room.hpp"
 
 namespace fbvins {
 
@@ -19,7 +19,7 @@ World build_world(const WorldOptions& options, const FloorPlan& plan, const std:
   World world;
   world.plan = plan;
   paint_all(world, seed);
-  Furnisher furnisher(world, options, path, seed);
+  RoomPopulator furnisher(world, options, path, seed);
   furnisher.build_shell();
   furnisher.hang_pictures();
   furnisher.cover_floors();

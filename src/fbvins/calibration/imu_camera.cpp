@@ -26,7 +26,7 @@ Error undetermined() {
 }  // namespace
 
 Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options) {
-  Result<CalibrationStart> start = gather_imu_camera(input, options);
+  Result<CalibrationStart> start = collect_imu_camera(input, options);
   if (!start) return start.error();
   start->setup.free_board_scale = true;
   // Where the accelerometer's scale is asked for, gravity must be known.

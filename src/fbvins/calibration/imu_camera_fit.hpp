@@ -8,7 +8,7 @@
 
 #include <optional>
 
-#include "fbvins/calibration/imu_camera_gather.hpp"
+#include "fbvins/calibration/imu_camera_collect.hpp"
 
 namespace fbvins {
 

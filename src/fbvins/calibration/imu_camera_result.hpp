@@ -2,7 +2,7 @@
 // Private to calibration: what a solved problem says, in the words of the result. Pure function.
 #pragma once
 
-#include "fbvins/calibration/imu_camera_gather.hpp"
+#include "fbvins/calibration/imu_camera_collect.hpp"
 
 namespace fbvins {
 

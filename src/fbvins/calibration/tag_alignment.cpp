@@ -83,7 +83,7 @@ class Alignment {
 
   bool begin(const Pose<Cn, T>& start) {
     pose_ = start;
-    if (!gather()) return false;
+    if (!collect()) return false;
     std::vector<double> greys;
     for (const Pixel& p : pixels_) greys.push_back(p.grey);
     std::ranges::sort(greys);
@@ -147,7 +147,7 @@ class Alignment {
   }
 
   /// Pixels of the tag and its margin.
-  bool gather() {
+  bool collect() {
     Vec2 low(1e9, 1e9), high(-1e9, -1e9);
     for (const double x : {-kMargin, kCells + kMargin})
       for (const double y : {-kMargin, kCells + kMargin}) {

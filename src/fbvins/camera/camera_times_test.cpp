@@ -5,7 +5,7 @@
 
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/camera/check_rig.hpp"
-#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 #include "fbvins/camera/scaled_lens.hpp"
 
 namespace fbvins {
@@ -62,7 +62,7 @@ TEST(CameraTimes, FacesOfAWideLensHaveThoseOfTheLens) {
   rig.right = Camera(KannalaBrandt{.fx = 180, .fy = 180, .cx = 319.5, .cy = 319.5, .k1 = 0, .k2 = 0, .k3 = 0, .k4 = 0}, 640, 640);
   ASSERT_TRUE(rig.right.sees_backwards());
   rig = with_times(rig, {{0, 0}, {0.002, 1e-5}});
-  const LensFaces faces(rig);
+  const VirtualPinholes faces(rig);
   for (int i = 0; i < faces.rig().camera_count(); ++i) EXPECT_EQ(faces.rig().times(i), rig.times(faces.lens_of(i))) << i;
 }
 

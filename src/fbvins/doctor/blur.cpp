@@ -128,7 +128,7 @@ struct Samples {
   std::vector<double> speeds_pxps;  ///< of the images
 };
 
-Samples gather(const Evidence& evidence, const ImuSeries& imu, const StereoRig& rig) {
+Samples collect(const Evidence& evidence, const ImuSeries& imu, const StereoRig& rig) {
   Samples out;
   const auto flow = flows(rig.left);
   const std::size_t n = evidence.frames.size(), step = n / kMostImages + 1;
@@ -194,7 +194,7 @@ double best_exposure(const std::array<std::array<double, kParts>, kExposures + 1
 Blur measure_blur(const Evidence& evidence, const ImuSeries& imu, const StereoRig& rig) {
   Blur blur;
   if (imu.empty() || evidence.frames.empty()) return blur;
-  Samples samples = gather(evidence, imu, rig);
+  Samples samples = collect(evidence, imu, rig);
   std::sort(samples.speeds_pxps.begin(), samples.speeds_pxps.end());
   blur.images = static_cast<int>(samples.speeds_pxps.end() -
                                  std::lower_bound(samples.speeds_pxps.begin(), samples.speeds_pxps.end(), kSlowest_pxps));

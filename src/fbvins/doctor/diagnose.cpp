@@ -8,7 +8,7 @@
 
 #include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/doctor/diagnose.hpp"
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/collect.hpp"
 #include "fbvins/doctor/rig_diagnosis.hpp"
 
 namespace fbvins {
@@ -27,7 +27,7 @@ std::shared_ptr<const Image> flipped(const std::shared_ptr<const Image>& image, 
 }
 
 Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFlip flip) {
-  EvidenceGatherer gatherer(rig);
+  EvidenceCollector gatherer(rig);
   const Result<void> played = replay([&](SensorEvent event) {
     if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && flip != ImageFlip::none) {
       frame->left = flipped(frame->left, flip);

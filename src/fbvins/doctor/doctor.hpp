@@ -3,7 +3,7 @@
 // has its own file of pure functions; this one calls them in the order in which each needs the results before it, and leaves
 // out what needs a result that is missing. Pure function, any thread.
 //
-//   EvidenceGatherer gatherer(rig);
+//   EvidenceCollector gatherer(rig);
 //   while (auto event = data.next()) if (!gatherer.push(*event)) break;
 //   Diagnosis diagnosis = examine(gatherer.finish());
 //   fmt::print("{}\n", to_text(diagnosis));

@@ -81,14 +81,14 @@ StereoRig corrected(const StereoRig& rig, const Hypothesis& at) {
 }  // namespace
 
 double epipolar_error_px(const StereoView& view, const StereoRig& rig) {
-  return typical_error_px(gather({&view, 1}, rig, nullptr, {}), Hypothesis(rig, Eigen::VectorXd::Zero(kUnknowns)));
+  return typical_error_px(collect({&view, 1}, rig, nullptr, {}), Hypothesis(rig, Eigen::VectorXd::Zero(kUnknowns)));
 }
 
 StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
                      std::span<const FramePair> pairs, bool focal_known) {
   StereoFit fit;
   fit.rig = rig;
-  const std::vector<Match> matches = thinned(gather(views, rig, imu, pairs));
+  const std::vector<Match> matches = thinned(collect(views, rig, imu, pairs));
   fit.matches = static_cast<int>(matches.size());
   if (matches.size() < kFewestMatches) return fit;
   StereoProblem problem(matches, rig);

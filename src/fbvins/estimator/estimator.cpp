@@ -243,7 +243,7 @@ std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame,
     return frame.features;
   }
   monitor_.expect({time_alignment_.stamp_sigma_s(), one_camera_ ? uncertainty_.velocity_sigma_mps() : 0, imu.noise});
-  const Monitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
+  const ConsistencyMonitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
                                                   predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
@@ -319,7 +319,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .failed_solves = failed_solves_,
                         .broken_features = contract_.broken(),
                         .contradiction = monitor_.contradicted() || carried_.contradicted(),
-                        .hopeless = monitor_.hopeless() || contradicted_too_long(frame.t),
+                        .unrecoverable = monitor_.unrecoverable() || contradicted_too_long(frame.t),
                         .wrong_cameras = wrong_cameras_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
                         .after_dark = monitor_.settling(),
@@ -358,7 +358,7 @@ void Estimator::restart() {
 /// A large pending correction is published at once, as a new W, if the pose was not good shortly before, or if it is twice the
 /// limit (W24). Otherwise it is published in steps, and the pose is not good meanwhile: a fast flight whose tilt becomes known
 /// far from its start.
-void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
+void Estimator::apply_or_defer_correction(const Pose<W, B>& level, Odometry& out) {
   const bool after_trouble = last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s;
   if (!after_trouble && !published_.pending_too_large(kAtOnce)) {
     out.health = health_.corrected(HealthEvidence::Correction::pending);
@@ -382,7 +382,7 @@ void Estimator::publish(Odometry& out) {
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
   // A sensor that is left out does not trouble the pose.
   const auto is_fine = [&] { return out.health.state == HealthState::good || is_of_aiding(out.health.reason); };
-  if (is_fine() && published_.pending_too_large()) settle_correction(level.T_FB, out);
+  if (is_fine() && published_.pending_too_large()) apply_or_defer_correction(level.T_FB, out);
   if (!is_fine() && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/estimator/carried_state.hpp"
+#include "fbvins/estimator/propagated_state.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/factor_maker.hpp"
@@ -18,7 +18,7 @@
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/keyframe_policy.hpp"
-#include "fbvins/estimator/monitor.hpp"
+#include "fbvins/estimator/consistency_monitor.hpp"
 #include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
@@ -81,7 +81,7 @@ class Estimator {
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
-  void settle_correction(const Pose<W, B>& level, Odometry& out);
+  void apply_or_defer_correction(const Pose<W, B>& level, Odometry& out);
   void publish(Odometry& out);
   Vec3 gravity_G() const;
 
@@ -100,8 +100,8 @@ class Estimator {
   HealthJudge health_;
   FrameContract contract_;
   ReadingNoise reading_noise_;
-  Monitor monitor_;
-  CarriedState carried_;
+  ConsistencyMonitor monitor_;
+  PropagatedState carried_;
   std::uint8_t wrong_cameras_ = 0;    ///< in the newest frame; bits, as in Health
   int frames_with_readings_ = 0;      ///< in a row
   Time judged_;                       ///< the newest frame that was

@@ -37,7 +37,7 @@ Health decide_health(const HealthEvidence& e, const HealthLimits& limits) {
       {e.speed_mps > limits.speed_mps, lost, R::implausible_speed},
       {implausible_bias, lost, R::implausible_bias},
       {e.few_tracks && (e.no_readings || e.longest_gap_s > limits.readings_gap_s), lost, R::imu_gap},
-      {e.hopeless, lost, R::contradiction},
+      {e.unrecoverable, lost, R::contradiction},
       // Data that are missing
       {e.failed_solves > 0, degraded, R::solver_failed},
       {e.no_readings || e.after_gap || e.longest_gap_s > kReadingsGap_s, degraded, R::imu_gap},

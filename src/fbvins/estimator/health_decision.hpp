@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// Of one frame, as HealthJudge and the estimator gather it. The defaults are those of a good one.
+/// Of one frame, as HealthJudge and the estimator collect it. The defaults are those of a good one.
 struct HealthEvidence {
   bool start_refused = false;
   std::optional<HealthReason> waiting_for = {};  ///< there is no window yet: for what
@@ -42,7 +42,7 @@ struct HealthEvidence {
 
   // What contradicts it
   bool contradiction = false;
-  bool hopeless = false;           ///< and the estimate cannot recover from it
+  bool unrecoverable = false;           ///< and the estimate cannot recover from it
   std::uint8_t wrong_cameras = 0;  ///< bits, as in Health; they contradict the others and the readings
   HealthReason doubted_sensor = HealthReason::none;  ///< another one that contradicts them and is left out
   enum class Correction { none, pending, made } correction = Correction::none;  ///< made: at once, after trouble

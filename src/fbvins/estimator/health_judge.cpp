@@ -89,7 +89,7 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
                .gyro_bias_radps = state.bias.gyro_radps.norm(),
                .accel_bias_mps2 = state.bias.accel_mps2.norm(),
                .contradiction = evidence.contradiction,
-               .hopeless = evidence.hopeless,
+               .unrecoverable = evidence.unrecoverable,
                .wrong_cameras = evidence.wrong_cameras,
                .doubted_sensor = evidence.doubted_sensor};
   return decide();

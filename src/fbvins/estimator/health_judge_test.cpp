@@ -141,7 +141,7 @@ TEST(HealthJudge, WhatSpeaksAgainstAPoseIsSaidWithItsReason) {
   };
   EXPECT_EQ(judged({}), good());
   EXPECT_EQ(judged({.contradiction = true}), degraded(HealthReason::contradiction));
-  EXPECT_EQ(judged({.contradiction = true, .hopeless = true}), lost(HealthReason::contradiction));
+  EXPECT_EQ(judged({.contradiction = true, .unrecoverable = true}), lost(HealthReason::contradiction));
   EXPECT_EQ(judged({.contradiction = true, .wrong_cameras = 0b01}),
             (Health{HealthState::degraded, HealthReason::cameras_disagree, 0b01}));
   EXPECT_EQ(judged({.after_gap = true}), degraded(HealthReason::imu_gap));

@@ -48,7 +48,7 @@ inline constexpr double kForgotten_s = 1;
 /// (I4a) The other camera, where only one drifts. A camera that was excluded for drift alone is used again after this time: the
 /// landmarks triangulated without it may be what is wrong. Chosen.
 inline constexpr double kOther = 0.5, kReadmitted_s = 1;
-/// A contradiction is over after so long without one; with images to compare missing for so long meanwhile it is hopeless.
+/// A contradiction is over after so long without one; with images to compare missing for so long meanwhile it is unrecoverable.
 /// Chosen.
 inline constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
 /// After darkness of this length the velocity is unknown, and the first predictions are as wrong as it is. Chosen.

@@ -31,7 +31,7 @@ FBVINS_INLINE void pick(const U8x16& from, const U8x16& which, U8x16& out) {
 }
 
 /// Sixteen source pixels give one block of results by picking left and right neighbours and blending: a byte shuffle
-/// instead of a gather. The lanes beyond the block are overwritten by the next one.
+/// instead of a collect. The lanes beyond the block are overwritten by the next one.
 FBVINS_KERNEL
 void blend_columns(const std::uint8_t* row, const ShrinkBlock* blocks, int count, int block_px, std::uint8_t* out) {
   using U16x16 = std::uint16_t __attribute__((vector_size(32)));

@@ -11,7 +11,7 @@
 
 #include <memory>
 
-#include "fbvins/frontend/handover.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 
 namespace fbvins {
 

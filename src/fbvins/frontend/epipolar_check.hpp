@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outliers among tracks observed in two images (paper 2.2.3): gather those to be judged, then one RANSAC over them.
+// Outliers among tracks observed in two images (paper 2.2.3): collect those to be judged, then one RANSAC over them.
 // Buffers are reused; one instance, one thread. One seeded generator serves all calls, so their order matters.
 //
 //   EpipolarCheck check(camera.focal_px(), 1);
-//   check.gather(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
+//   check.collect(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
 //   EpipolarResult result = check.judge(tracks, motion.R_ba, 0.7, stats);      // outliers are lost
 #pragma once
 
@@ -22,7 +22,7 @@ class EpipolarCheck {
 
   /// `then(track)`: pointer to the normalised position in the earlier image; null leaves the track out.
   template <class Tracks, class Then>
-  void gather(const Tracks& tracks, Then&& then) {
+  void collect(const Tracks& tracks, Then&& then) {
     chosen_.clear();
     then_.clear();
     now_.clear();

@@ -24,7 +24,7 @@ const Vec2* before(const TrackState& track) { return &track.previous_normalised;
 TEST(EpipolarCheck, LosesThoseThatMovedByThemselves) {
   std::vector<TrackState> tracks = tracks_with_outliers();
   EpipolarCheck check(400, 1);
-  check.gather(tracks, before);
+  check.collect(tracks, before);
   EXPECT_EQ(check.gathered(), tracks.size());
   FrontendStats stats;
   const EpipolarResult result = check.judge(tracks, Mat3(Mat3::Identity()), 1.0, stats);
@@ -37,7 +37,7 @@ TEST(EpipolarCheck, JudgesOnlyThoseGatheredAndNoneThatHasEnded) {
   std::vector<TrackState> tracks = tracks_with_outliers();
   EpipolarCheck check(400, 1);
   tracks[5].status = TrackStatus::out_of_view;
-  check.gather(tracks, [&](const TrackState& track) { return &track == &tracks[0] ? nullptr : before(track); });
+  check.collect(tracks, [&](const TrackState& track) { return &track == &tracks[0] ? nullptr : before(track); });
   EXPECT_EQ(check.gathered(), tracks.size() - 2);
   FrontendStats stats;
   (void)check.judge(tracks, Mat3(Mat3::Identity()), 1.0, stats);

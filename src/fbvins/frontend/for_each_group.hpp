@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One frontend for a rig of any number of cameras, of those that lead (handover.hpp).
+// One frontend for a rig of any number of cameras, of those that lead (track_transfer.hpp).
 //
 //   for_each_group(rig, 150, [](const StereoRig& r) { return std::make_unique<KltFrontend>(r, options); });
 #pragma once
@@ -7,7 +7,7 @@
 #include <functional>
 #include <memory>
 
-#include "fbvins/frontend/handover.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 
 namespace fbvins {
 

@@ -84,13 +84,13 @@ void GenericLead::begin_ids_at(std::int64_t id) {
   numberings_.push_back({next_own_, next_id_});
 }
 
-Handover GenericLead::hand_over() {
-  Handover out;
+TrackTransfer GenericLead::hand_over() {
+  TrackTransfer out;
   out.next_id = next_id_;
   return out;
 }
 
-void GenericLead::take_over(Handover handover) {
+void GenericLead::take_over(TrackTransfer handover) {
   next_id_ = std::max(next_id_, handover.next_id);
   begin_anew();
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frontend of any kind as one that can lead a pair (handover.hpp): it gives no tracks to another and takes none, but begins
+// A frontend of any kind as one that can lead a pair (track_transfer.hpp): it gives no tracks to another and takes none, but begins
 // anew. Synchronous; one instance is used by one thread at a time.
 //
 //   GenericLead lead(rig, [](const StereoRig& r) { return std::make_unique<MyFrontend>(r); });
 #pragma once
 
 #include "fbvins/frontend/any_rig.hpp"
-#include "fbvins/frontend/handover.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 
 namespace fbvins {
 
@@ -22,8 +22,8 @@ class GenericLead final : public LeadingFrontend {
   bool reaches(Time t) const override;
   void begin_ids_at(std::int64_t id) override;
   std::int64_t next_id() const override { return next_id_; }
-  Handover hand_over() override;
-  void take_over(Handover handover) override;
+  TrackTransfer hand_over() override;
+  void take_over(TrackTransfer handover) override;
 
  private:
   /// From a track number of the frontend on.

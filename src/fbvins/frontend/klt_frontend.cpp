@@ -84,9 +84,9 @@ void KltFrontend::follow_tracks(const CameraMotion& motion, FrontendStats& stats
 void KltFrontend::reject_outliers(const CameraMotion& motion, FrontendStats& stats) {
   std::optional<Mat3> R_ba;
   if (motion.has_rotation) R_ba = motion.R_ba;
-  motion_.gather(tracks_, [](const KltTrack& track) { return &track.previous_normalised; });
+  motion_.collect(tracks_, [](const KltTrack& track) { return &track.previous_normalised; });
   motion_.judge(tracks_, motion, (images_.t() - images_.t_before()).seconds(), stats);
-  epipolar_.gather(tracks_, [](const KltTrack& track) { return &track.previous_normalised; });
+  epipolar_.collect(tracks_, [](const KltTrack& track) { return &track.previous_normalised; });
   const EpipolarResult result = epipolar_.judge(tracks_, R_ba, options_.epipolar_px, stats);
   reject_slow_outliers(result.R_ba, stats);
   tracks_.drop_ended();
@@ -100,7 +100,7 @@ void KltFrontend::reject_slow_outliers(const Mat3& R_ba, FrontendStats& stats) {
   constexpr int kHistory = KltTrack::kHistory;
   rotations_[static_cast<std::size_t>(next_rotation_)] = R_ba;
   next_rotation_ = (next_rotation_ + 1) % kHistory;
-  epipolar_.gather(tracks_, [](const KltTrack& track) -> const Vec2* {
+  epipolar_.collect(tracks_, [](const KltTrack& track) -> const Vec2* {
     return track.age_frames < kHistory ? nullptr : &track.at_age(track.age_frames);  // not overwritten yet: kHistory ago
   });
   if (epipolar_.gathered() < kFewestForLongCheck) return;
@@ -137,20 +137,20 @@ bool KltFrontend::cut_patches(KltTrack& track, KltPatches& patches, const Pyrami
   return true;
 }
 
-Handover KltFrontend::hand_over() {
-  Handover out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
+TrackTransfer KltFrontend::hand_over() {
+  TrackTransfer out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
   if (out.image.empty()) return out;
   for (const KltTrack& track : tracks_)
     if (const auto handed = seen_by_second(track, rig_.T_C1C0())) out.tracks.push_back(*handed);
   return out;
 }
 
-void KltFrontend::take_over(Handover handover) {
+void KltFrontend::take_over(TrackTransfer handover) {
   tracks_.end_all(TrackStatus::lost);
   tracks_.drop_ended();
   tracks_.begin_ids_at(handover.next_id);
   std::vector<double> inverse_depths;
-  for (const HandedTrack& handed : handover.tracks) {
+  for (const TransferredTrack& handed : handover.tracks) {
     if (tracks_.full()) break;
     KltTrack track;  // its age is that of its history, in this camera
     track.id = handed.id;

@@ -11,7 +11,7 @@
 
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/epipolar_check.hpp"
-#include "fbvins/frontend/handover.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_options.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
@@ -34,8 +34,8 @@ class KltFrontend final : public LeadingFrontend {
   bool reaches(Time t) const override { return images_.reaches(t, options_.max_gap_s); }
   void begin_ids_at(std::int64_t id) override { tracks_.begin_ids_at(id); }
   std::int64_t next_id() const override { return tracks_.next_id(); }
-  Handover hand_over() override;
-  void take_over(Handover handover) override;
+  TrackTransfer hand_over() override;
+  void take_over(TrackTransfer handover) override;
 
  private:
   void follow_tracks(const CameraMotion& motion, FrontendStats& stats);

@@ -5,7 +5,7 @@
 // Buffers are reused; one instance, one thread.
 //
 //   MotionCheck check(camera, baseline_m);
-//   check.gather(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
+//   check.collect(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
 //   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);  // those that move are lost
 #pragma once
 
@@ -26,7 +26,7 @@ class MotionCheck {
   /// `before(track)`: pointer to the normalised position in the image before; null leaves the track out, as an unknown depth
   /// does.
   template <class Tracks, class Before>
-  void gather(const Tracks& tracks, Before&& before) {
+  void collect(const Tracks& tracks, Before&& before) {
     chosen_.clear();
     points_.clear();
     for (std::size_t i = 0; i < tracks.size(); ++i) {

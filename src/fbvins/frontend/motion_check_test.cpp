@@ -44,7 +44,7 @@ struct Crowd {
   std::pair<int, int> lost(const CameraMotion& predicted) {
     MotionCheck check(kPinhole, 0.11);
     FrontendStats stats;
-    check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
+    check.collect(tracks, [](const Track& track) { return &track.previous_normalised; });
     check.judge(tracks, predicted, kDt_s, stats);
     std::pair<int, int> out{0, 0};
     for (std::size_t i = 0; i < tracks.size(); ++i)
@@ -111,7 +111,7 @@ TEST(MotionCheck, KeepsWhatStandsStillInFastFlightAhead) {
   }
   MotionCheck check(kPinhole, 0.11);
   FrontendStats stats;
-  check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
+  check.collect(tracks, [](const Track& track) { return &track.previous_normalised; });
   check.judge(tracks, ahead, kDt_s, stats);
   EXPECT_EQ(stats.lost_check, 0);
 }
@@ -135,7 +135,7 @@ TEST(MotionCheck, MeasuresInPixelsOfTheLens) {
   still.has_rotation = still.has_translation = true;
   MotionCheck check(fisheye, 0.11);
   FrontendStats stats;
-  check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
+  check.collect(tracks, [](const Track& track) { return &track.previous_normalised; });
   check.judge(tracks, still, kDt_s, stats);
   EXPECT_EQ(stats.lost_check, 0);
 }

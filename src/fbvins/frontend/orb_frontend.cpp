@@ -144,11 +144,11 @@ void OrbFrontend::stand_by(const SensorPacket& packet, const StatePrior& prior) 
   recogniser_.forget_unlocated(packet.frame.t);
 }
 
-Handover OrbFrontend::hand_over() {
-  Handover out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
+TrackTransfer OrbFrontend::hand_over() {
+  TrackTransfer out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
   if (out.image.empty()) return out;
   for (const OrbTrack& track : tracks_) {
-    std::optional<HandedTrack> handed = seen_by_second(track, T_C1C0_);
+    std::optional<TransferredTrack> handed = seen_by_second(track, T_C1C0_);
     if (!handed) continue;
     handed->descriptor = track.descriptor;
     handed->raw = track.raw;
@@ -160,7 +160,7 @@ Handover OrbFrontend::hand_over() {
   return out;
 }
 
-void OrbFrontend::take_over(Handover handover) {
+void OrbFrontend::take_over(TrackTransfer handover) {
   tracks_.end_all(TrackStatus::out_of_view);
   drop_ended();
   tracks_.begin_ids_at(handover.next_id);
@@ -168,14 +168,14 @@ void OrbFrontend::take_over(Handover handover) {
   view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
   std::vector<double> inverse_depths;
-  for (const HandedTrack& handed : handover.tracks)
+  for (const TransferredTrack& handed : handover.tracks)
     if (!tracks_.full() && resume(handed, handover.image)) inverse_depths.push_back(handed.inverse_depth);
   depth_.assume(inverse_depths);
   images_.start_from(std::move(handover.image), handover.t);
   ++view_.index;
 }
 
-bool OrbFrontend::resume(const HandedTrack& handed, const Pyramid& image) {
+bool OrbFrontend::resume(const TransferredTrack& handed, const Pyramid& image) {
   recogniser_.forget(handed.id);
   OrbPatches& patches = tracks_.free_patches();
   if (!patches.newest.cut(image, handed.px, 0, kOrbAlignmentLevels - 1)) return false;

@@ -14,7 +14,7 @@
 #include <memory>
 
 #include "fbvins/frontend/detection_policy.hpp"
-#include "fbvins/frontend/handover.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/orb_depth.hpp"
 #include "fbvins/frontend/orb_locator.hpp"
@@ -40,8 +40,8 @@ class OrbFrontend final : public LeadingFrontend {
   bool reaches(Time t) const override { return images_.reaches(t, longest_gap_s()); }
   void begin_ids_at(std::int64_t id) override { tracks_.begin_ids_at(id); }
   std::int64_t next_id() const override { return tracks_.next_id(); }
-  Handover hand_over() override;
-  void take_over(Handover handover) override;
+  TrackTransfer hand_over() override;
+  void take_over(TrackTransfer handover) override;
 
   /// Whether it is a current track, or its landmark is remembered.
   bool can_reobserve(TrackId track) const;
@@ -51,7 +51,7 @@ class OrbFrontend final : public LeadingFrontend {
   bool follow(const ImageView& left, FrontendStats& stats);
   void detect(const ImageView& left, FrontendStats& stats);
   void drop_ended();
-  bool resume(const HandedTrack& handed, const Pyramid& image);
+  bool resume(const TransferredTrack& handed, const Pyramid& image);
 
   OrbFrontendOptions options_;
   int most_;  ///< features

@@ -7,12 +7,12 @@
 #include <map>
 
 #include "fbvins/core/options.hpp"
-#include "tests/support/passed_wall.hpp"
+#include "tests/support/textured_wall.hpp"
 
 namespace fbvins {
 namespace orb_frontend_test {
 
-using namespace passed_wall;
+using namespace textured_wall;
 
 std::vector<TrackedFrame> run(const std::vector<SensorPacket>& input, const OrbFrontendOptions& options = small_options(),
                               const StereoRig& rig = world().rig) {

@@ -12,12 +12,12 @@ void OrbOutlierCheck::judge(OrbTracks& tracks, const OrbView& view, const Motion
     const CameraMotion motion = predictor.between(t_then, view.t);
     const auto seen_then = [&](const OrbTrack& track) { return track.observed ? track.position_in(then) : nullptr; };
     if (lag == 1) {
-      motion_.gather(tracks, seen_then);
+      motion_.collect(tracks, seen_then);
       motion_.judge(tracks, motion, (view.t - t_then).seconds(), stats);
     }
     std::optional<Mat3> R_now_then;
     if (motion.has_rotation) R_now_then = motion.R_ba;
-    epipolar_.gather(tracks, seen_then);
+    epipolar_.collect(tracks, seen_then);
     (void)epipolar_.judge(tracks, R_now_then, threshold_px_, stats);
   }
 }

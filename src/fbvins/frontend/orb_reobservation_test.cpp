@@ -6,13 +6,13 @@
 #include <map>
 
 #include "fbvins/frontend/orb_frontend.hpp"
-#include "tests/support/passed_wall.hpp"
+#include "tests/support/textured_wall.hpp"
 #include "tests/support/test_wall.hpp"
 
 namespace fbvins {
 namespace orb_reobservation_test {
 
-using namespace passed_wall;
+using namespace textured_wall;
 
 /// The exact state at frame k.
 StatePrior true_state(int k) {

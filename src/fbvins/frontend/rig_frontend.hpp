@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "fbvins/camera/camera_groups.hpp"
-#include "fbvins/frontend/handover.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/track_budget.hpp"
 
 namespace fbvins {

@@ -9,7 +9,7 @@
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
-#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/core/overloaded.hpp"
 #include "fbvins/estimator/estimator.hpp"
@@ -24,7 +24,7 @@ namespace {
 
 /// An error where a standing vehicle has no up, or where lenses that see more than 180 degrees are too many, or are to be
 /// calibrated in flight.
-Result<void> check_estimator(const EstimatorOptions& options, const LensFaces& lenses) {
+Result<void> check_estimator(const EstimatorOptions& options, const VirtualPinholes& lenses) {
   const StandingOptions& s = options.standing;
   if (s.tilt_rad > 0 && Vec3(s.up_x, s.up_y, s.up_z).isZero(0))
     return Error{ErrorCode::invalid_argument, "estimator.standing: up_x, up_y and up_z are all zero: none says where up is"};
@@ -60,7 +60,7 @@ struct System::Impl {
 
   RunMode mode;
   ExposureOffsets own_offsets;  ///< of the rig's cameras
-  LensFaces lenses;             ///< makes of a wide lens the cameras that the frontend and the estimator are given
+  VirtualPinholes lenses;             ///< makes of a wide lens the cameras that the frontend and the estimator are given
   PacketMaker packet_maker;
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
@@ -86,7 +86,7 @@ struct System::Impl {
   /// Deep enough for the keyframes of a second or two, while the mapper optimises its whole graph.
   Stage<MapTask, Impl> mapping{"the mapper", &Impl::map, BoundedQueue<MapTask>{12}};
 
-  Impl(const SystemOptions& options, const StereoRig& rig, LensFaces lenses_of_rig, RunMode mode_wanted, SystemParts parts)
+  Impl(const SystemOptions& options, const StereoRig& rig, VirtualPinholes lenses_of_rig, RunMode mode_wanted, SystemParts parts)
       : mode(mode_wanted),
         own_offsets(fbvins::own_offsets(rig)),
         lenses(std::move(lenses_of_rig)),
@@ -245,7 +245,7 @@ struct System::Impl {
 Result<System> System::create(const SystemOptions& options, const StereoRig& rig, RunMode mode, SystemParts parts) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
   if (Result<void> good = check_rig(rig, "the rig"); !good) return good.error();
-  LensFaces lenses(rig);
+  VirtualPinholes lenses(rig);
   if (Result<void> good = check_estimator(options.estimator, lenses); !good) return good.error();
   if (!parts.frontend) {
     Result<std::unique_ptr<Frontend>> frontend = make_frontend(lenses.rig(), options.frontend);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/carried_velocity.hpp"
+#include "fbvins/estimator/propagated_velocity.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,31 +16,31 @@ using namespace thresholds;
 
 }  // namespace
 
-void CarriedVelocity::Carried::carry(const ImuSegment& readings) {
+void PropagatedVelocity::Carried::carry(const ImuSegment& readings) {
   known.state = propagate(known.state, readings, known.gravity_G);
   seconds += (readings.samples.back().t - readings.samples.front().t).seconds();
 }
 
-bool CarriedVelocity::Carried::joins(const std::vector<TrackId>& seen) const {
+bool PropagatedVelocity::Carried::joins(const std::vector<TrackId>& seen) const {
   std::vector<TrackId> both;
   std::set_intersection(seen.begin(), seen.end(), tracks.begin(), tracks.end(), std::back_inserter(both));
   return both.size() >= kFewestLinked && static_cast<double>(both.size()) >= kLinked * static_cast<double>(seen.size());
 }
 
-double CarriedVelocity::Carried::sigma_mps() const {
+double PropagatedVelocity::Carried::sigma_mps() const {
   const double t = seconds, g = known.gravity_G.norm();
   return std::hypot(std::hypot(known.velocity_sigma_mps, g * known.tilt_sigma_rad * t),
                     std::hypot(g * known.gyro_bias_sigma_radps * t * t / 2, known.accel_bias_sigma_mps2 * t), kAccel_mps2 * t);
 }
 
 /// What the pose has moved by is still told.
-void CarriedVelocity::forget() {
+void PropagatedVelocity::forget() {
   const Vec3 shift_G = shift_G_;
   *this = {};
   shift_G_ = shift_G;
 }
 
-void CarriedVelocity::carry(const ImuSegment& readings) {
+void PropagatedVelocity::carry(const ImuSegment& readings) {
   if (!newest_) return;
   if (readings.empty() || readings.longest_gap.seconds() > kReadingsGap_s) return forget();
   newest_->carry(readings);
@@ -52,7 +52,7 @@ void CarriedVelocity::carry(const ImuSegment& readings) {
   if ((before_ ? before_ : newest_)->seconds > kCarriedFor_s) forget();
 }
 
-void CarriedVelocity::compare(const Known& now, std::vector<TrackId> seen, bool contradicted) {
+void PropagatedVelocity::compare(const Known& now, std::vector<TrackId> seen, bool contradicted) {
   std::sort(seen.begin(), seen.end());
   if (!newest_) {
     if (!contradicted) newest_ = Carried{now, 0, std::move(seen)};
@@ -76,7 +76,7 @@ void CarriedVelocity::compare(const Known& now, std::vector<TrackId> seen, bool 
   if (before_ && over()) before_.reset(), velocity_G_.setZero();
 }
 
-void CarriedVelocity::judge(const NavState<G>& now) {
+void PropagatedVelocity::judge(const NavState<G>& now) {
   const Vec3 jump_B = now.v_B() - newest_->known.state.v_B();
   if (jump_B.norm() <= std::max(kVelocity_mps, kVelocity_sigma * newest_->sigma_mps())) return;
   if (!before_) before_ = newest_, begun_mps_ = jump_B.norm();
@@ -85,13 +85,13 @@ void CarriedVelocity::judge(const NavState<G>& now) {
   shift_G_ += newest_->seconds * jump_G;
 }
 
-bool CarriedVelocity::over() const {
+bool PropagatedVelocity::over() const {
   const double small_mps = std::max(kVelocity_mps, begun_mps_ / 2);
   const double away_mps = (newest_->known.state.v_B() - before_->known.state.v_B()).norm();
   return velocity_G_.norm() <= small_mps || away_mps <= small_mps || before_->joins(newest_->tracks);
 }
 
-bool CarriedVelocity::take_reset() {
+bool PropagatedVelocity::take_reset() {
   if (contradicted()) return false;
   const bool moved = shift_G_.norm() >= kMovedAlong_m;
   shift_G_.setZero();

@@ -18,7 +18,7 @@
 namespace fbvins {
 
 /// A track in the camera that leads from now on.
-struct HandedTrack {
+struct TransferredTrack {
   TrackId id;
   Vec2 px = Vec2::Zero(), normalised = Vec2::Zero();
   double inverse_depth = 0;  ///< 1/m along that camera's z
@@ -29,10 +29,10 @@ struct HandedTrack {
   std::optional<Vec3> seen_from_G, p_G;
 };
 
-struct Handover {
+struct TrackTransfer {
   Time t;         ///< of the image
   Pyramid image;  ///< of the camera that leads from now on; empty if it had none, and there are no tracks then
-  std::vector<HandedTrack> tracks;
+  std::vector<TransferredTrack> tracks;
   std::int64_t next_id = 0;  ///< of the next new track
 };
 
@@ -47,18 +47,18 @@ class LeadingFrontend : public Frontend {
   virtual void begin_ids_at(std::int64_t id) = 0;
   virtual std::int64_t next_id() const = 0;
   /// Ends the use of the second camera's newest image, which moves out.
-  virtual Handover hand_over() = 0;
+  virtual TrackTransfer hand_over() = 0;
   /// Instead of its own tracks.
-  virtual void take_over(Handover handover) = 0;
+  virtual void take_over(TrackTransfer handover) = 0;
 };
 
 /// The track as the second camera sees it; nothing where it does not, or the depth is unknown.
-inline std::optional<HandedTrack> seen_by_second(const TrackState& track, const Pose<C1, C0>& T_C1C0) {
+inline std::optional<TransferredTrack> seen_by_second(const TrackState& track, const Pose<C1, C0>& T_C1C0) {
   if (!track.observed || track.status != TrackStatus::active || !track.right || !track.inverse_depth) return std::nullopt;
   const double rho = *track.inverse_depth;
   const double scaled_depth = (T_C1C0.q * track.normalised.homogeneous() + rho * T_C1C0.p).z();
   if (!(scaled_depth > 0)) return std::nullopt;
-  HandedTrack handed;
+  TransferredTrack handed;
   handed.id = track.id;
   handed.px = track.right->pixel;
   handed.normalised = track.right->normalised;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace lens_faces_test {
+namespace virtual_pinholes_test {
 
 /// Lenses of 200 to 220 degrees of each model that has them.
 std::vector<Camera> wide_lenses() {
@@ -27,7 +27,7 @@ StereoRig rig_of(const Camera& left, const Camera& right) {
   return rig;
 }
 
-TEST(LensFaces, RaysBehindTheLensComeBackFromTheirPixels) {
+TEST(VirtualPinholes, RaysBehindTheLensComeBackFromTheirPixels) {
   Rng rng(1);
   for (const Camera& camera : wide_lenses()) {
     int backwards = 0;
@@ -49,7 +49,7 @@ TEST(LensFaces, RaysBehindTheLensComeBackFromTheirPixels) {
   }
 }
 
-TEST(LensFaces, ATurnedCameraProjectsAndComesBackWithTheRightSlope) {
+TEST(VirtualPinholes, ATurnedCameraProjectsAndComesBackWithTheRightSlope) {
   Rng rng(2);
   for (const Camera& lens : wide_lenses()) {
     const Mat3 R = so3_exp(Vec3(0.3, 1.2, -0.2)).toRotationMatrix();
@@ -78,7 +78,7 @@ TEST(LensFaces, ATurnedCameraProjectsAndComesBackWithTheRightSlope) {
 }
 
 /// Each pixel with a ray is shown by one face at least, with an angle from its axis at which a plane still is good.
-TEST(LensFaces, TheFacesShowAllOfTheImage) {
+TEST(VirtualPinholes, TheFacesShowAllOfTheImage) {
   for (const Camera& camera : wide_lenses()) {
     const Pose<B, C0> T_BC(Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.1, 0.2, 0.3));
     const std::vector<MountedCamera> faces = faces_of({camera, T_BC});
@@ -106,7 +106,7 @@ TEST(LensFaces, TheFacesShowAllOfTheImage) {
   }
 }
 
-TEST(LensFaces, HideWhatTheLensMaskHides) {
+TEST(VirtualPinholes, HideWhatTheLensMaskHides) {
   Camera camera = wide_lenses()[0];
   Image seen(512, 512, 255);
   ASSERT_TRUE(hide(seen, MaskCircle{256, 100, 50}));
@@ -114,7 +114,7 @@ TEST(LensFaces, HideWhatTheLensMaskHides) {
   for (const MountedCamera& face : faces_of({camera, {}})) EXPECT_TRUE(face.camera.hidden({256, 100}, 0));
 }
 
-TEST(LensFaces, ALensThatTheImageCutsOffAboveAndBelowHasNoFaceThere) {
+TEST(VirtualPinholes, ALensThatTheImageCutsOffAboveAndBelowHasNoFaceThere) {
   const Camera camera(KannalaBrandt{200, 200, 376, 80, 0, 0, 0, 0}, 752, 160);  // 215 degrees by 46
   ASSERT_TRUE(camera.sees_backwards());
   const std::vector<MountedCamera> faces = faces_of({camera, {}});
@@ -122,11 +122,11 @@ TEST(LensFaces, ALensThatTheImageCutsOffAboveAndBelowHasNoFaceThere) {
   for (const MountedCamera& face : faces) EXPECT_LT(std::abs((face.T_BC.q * Vec3::UnitZ()).y()), 0.1);
 }
 
-TEST(LensFaces, KeepTheNumbersOfTheRigsCameras) {
+TEST(VirtualPinholes, KeepTheNumbersOfTheRigsCameras) {
   const Camera wide = wide_lenses()[0], narrow(PinholeRadtan{460, 460, 376, 240, 0, 0, 0, 0}, 752, 480);
   const StereoRig plain = rig_of(narrow, narrow), mixed = rig_of(wide, narrow), both = rig_of(wide, wide);
-  EXPECT_FALSE(LensFaces(plain).any());
-  const LensFaces faces(mixed);
+  EXPECT_FALSE(VirtualPinholes(plain).any());
+  const VirtualPinholes faces(mixed);
   ASSERT_TRUE(faces.any());
   ASSERT_EQ(faces.rig().camera_count(), 5);
   EXPECT_EQ(faces.lens_of(0), 0);
@@ -135,8 +135,8 @@ TEST(LensFaces, KeepTheNumbersOfTheRigsCameras) {
   EXPECT_EQ(faces.rig().T_BC1.p, mixed.T_BC1.p);
   EXPECT_EQ(faces.lenses_of(0b00010), 0b10);
   EXPECT_EQ(faces.lenses_of(0b01000), 0b01);
-  EXPECT_EQ(LensFaces(both).rig().camera_count(), 8);
-  EXPECT_EQ(LensFaces(both).lenses_of(0b11100000), 0b10);
+  EXPECT_EQ(VirtualPinholes(both).rig().camera_count(), 8);
+  EXPECT_EQ(VirtualPinholes(both).lenses_of(0b11100000), 0b10);
 
   auto picture = std::make_shared<Image>(512, 512);
   for (int y = 0; y < 512; ++y)
@@ -163,16 +163,16 @@ TEST(LensFaces, KeepTheNumbersOfTheRigsCameras) {
   EXPECT_EQ(faces.spread(frame).image(3), nullptr);
 }
 
-TEST(LensFaces, KeepAllRowsOfARollingShutter) {
+TEST(VirtualPinholes, KeepAllRowsOfARollingShutter) {
   StereoRig rig = rig_of(wide_lenses()[0], wide_lenses()[0]);
   rig.line_delay_s = 2e-5;
-  const LensFaces faces(rig);
+  const VirtualPinholes faces(rig);
   for (int i = 0; i < faces.rig().camera_count(); ++i) EXPECT_EQ(faces.rig().camera(i).height(), 512);
 }
 
-TEST(LensFaces, OneLensIsSeveralCameras) {
+TEST(VirtualPinholes, OneLensIsSeveralCameras) {
   StereoRig rig = rig_of(wide_lenses()[1], {});
-  const LensFaces faces(with_one_camera(rig));
+  const VirtualPinholes faces(with_one_camera(rig));
   ASSERT_EQ(faces.rig().camera_count(), 4);
   TrackedFrame frame;
   frame.features.resize(2);
@@ -187,5 +187,5 @@ TEST(LensFaces, OneLensIsSeveralCameras) {
   EXPECT_TRUE(gathered.has_more.empty());
 }
 
-}  // namespace lens_faces_test
+}  // namespace virtual_pinholes_test
 }  // namespace fbvins

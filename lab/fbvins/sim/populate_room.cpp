@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/sim/furnish.hpp"
+#include "fbvins/sim/populate_room.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +54,7 @@ void add_box(std::vector<Facet>& facets, const BoxShape& shape, int texture, flo
     }
 }
 
-Furnisher::Furnisher(World& world, const WorldOptions& options, const std::vector<Vec3>& path, std::uint64_t seed)
+RoomPopulator::RoomPopulator(World& world, const WorldOptions& options, const std::vector<Vec3>& path, std::uint64_t seed)
     : world_(world), options_(options), path_(path), rng_(seed, 31) {
   for (const WallRun& run : wall_runs(world.plan)) {
     const Vec2 d = run.b - run.a;
@@ -62,23 +62,23 @@ Furnisher::Furnisher(World& world, const WorldOptions& options, const std::vecto
   }
 }
 
-int Furnisher::texture(Surface surface) {
+int RoomPopulator::texture(Surface surface) {
   return static_cast<int>(surface) * kVariants + static_cast<int>(rng_.below(kVariants));
 }
 
-int Furnisher::plain_or(std::initializer_list<Surface> choices) {
+int RoomPopulator::plain_or(std::initializer_list<Surface> choices) {
   if (rng_.uniform() < options_.plain_share)
     return texture(rng_.uniform() < options_.weave_share ? Surface::weave : Surface::plaster);
   return texture(*(choices.begin() + rng_.below(static_cast<std::uint32_t>(choices.size()))));
 }
 
-bool Furnisher::is_clear(const Vec3& p, double radius) const {
+bool RoomPopulator::is_clear(const Vec3& p, double radius) const {
   const double nearest = radius + options_.clearance_m;
   return std::none_of(path_.begin(), path_.end(), [&](const Vec3& q) { return (p - q).squaredNorm() < nearest * nearest; });
 }
 
 /// A rectangle on a wall: metres along it and above the floor.
-void Furnisher::add_panel(const Wall& wall, double from, double to, double low, double high, int texture, double texture_m,
+void RoomPopulator::add_panel(const Wall& wall, double from, double to, double low, double high, int texture, double texture_m,
                           double offset, float tint) {
   const Vec3 x = wall.along.normalized();
   Facet f;
@@ -93,7 +93,7 @@ void Furnisher::add_panel(const Wall& wall, double from, double to, double low, 
   world_.facets.push_back(f);
 }
 
-void Furnisher::build_shell() {
+void RoomPopulator::build_shell() {
   for (const Wall& wall : walls_) {
     const int base = plain_or({Surface::plaster, Surface::brick, Surface::concrete, Surface::concrete, Surface::wood});
     const float shade = tint();
@@ -134,7 +134,7 @@ void Furnisher::build_shell() {
 }
 
 /// Equal things at equal distances, such as lockers or posts: ambiguous for matchers.
-void Furnisher::repeat_along(const Wall& wall) {
+void RoomPopulator::repeat_along(const Wall& wall) {
   const double pitch = rng_.uniform(0.5, 1.1), width = pitch * rng_.uniform(0.45, 0.8);
   const double low = rng_.uniform(0.2, 1.0), high = low + rng_.uniform(0.7, 1.4);
   const int what = plain_or({Surface::panel, Surface::metal, Surface::books, Surface::cardboard});
@@ -143,7 +143,7 @@ void Furnisher::repeat_along(const Wall& wall) {
     add_panel(wall, at, at + width, low, std::min(high, world_.plan.height_m - 0.1), what, width, 0.02, 1);
 }
 
-void Furnisher::add_door(const Wall& wall, double at) {
+void RoomPopulator::add_door(const Wall& wall, double at) {
   const double high = std::min(2.05, world_.plan.height_m - 0.1);
   add_panel(wall, at, at + 1.04, 0, high + 0.07, texture(Surface::metal), 1.04, 0.014, 0.6f);
   add_panel(wall, at + 0.07, at + 0.97, 0, high, texture(Surface::wood), 1.6, 0.02, 1.0f);
@@ -152,7 +152,7 @@ void Furnisher::add_door(const Wall& wall, double at) {
 }
 
 /// A window with a grid of bars and bright sky, and a radiator below.
-void Furnisher::add_window(const Wall& wall, double at) {
+void RoomPopulator::add_window(const Wall& wall, double at) {
   const double width = rng_.uniform(0.8, 1.4), high = std::min(world_.plan.height_m - 0.25, 2.3);
   if (at + width + 0.1 > wall.length()) return;
   add_panel(wall, at - 0.06, at + width + 0.06, 0.9, high + 0.06, texture(Surface::wood), 1.0, 0.013, 1.2f);
@@ -170,7 +170,7 @@ void Furnisher::add_window(const Wall& wall, double at) {
   add_panel(wall, at, at + width, 0.12, 0.78, texture(Surface::metal), 2.0, 0.03, 0.35f);
 }
 
-void Furnisher::lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m,
+void RoomPopulator::lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m,
                              int layer) {
   const Vec3 x(std::cos(angle), std::sin(angle), 0), y(-x.y(), x.x(), 0);
   Facet f;
@@ -186,7 +186,7 @@ void Furnisher::lay_on_floor(const Vec3& centre, double angle, double length, do
   world_.facets.push_back(f);
 }
 
-void Furnisher::cover_floors() {
+void RoomPopulator::cover_floors() {
   for (const FloorRect& room : world_.plan.rooms) {
     const auto somewhere = [&] {
       const double x = rng_.uniform(room.x0 + 0.3, room.x1 - 0.3), y = rng_.uniform(room.y0 + 0.3, room.y1 - 0.3);
@@ -213,7 +213,7 @@ void Furnisher::cover_floors() {
   }
 }
 
-void Furnisher::hang_pictures() {
+void RoomPopulator::hang_pictures() {
   for (const Wall& wall : walls_) {
     if (wall.length() < 0.8) continue;
     if (rng_.uniform() < options_.repeat_share) repeat_along(wall);
@@ -240,14 +240,14 @@ void Furnisher::hang_pictures() {
 
 /// Notes the facets that `add` puts into the room as one piece. Returns what it returns.
 template <class Add>
-bool Furnisher::as_piece(const Add& add) {
+bool RoomPopulator::as_piece(const Add& add) {
   const std::size_t first = world_.facets.size();
   const bool done = add();
   if (world_.facets.size() > first) world_.furniture.push_back({first, world_.facets.size() - first});
   return done;
 }
 
-void Furnisher::place_furniture() {
+void RoomPopulator::place_furniture() {
   for (const Wall& wall : walls_)
     for (double at = rng_.uniform(0.1, 1.0); at + 0.6 < wall.length(); at += rng_.uniform(1.2, 3.0))
       if (rng_.uniform() < 0.2 * options_.clutter_per_m2 + 0.1) as_piece([&] { return add_shelf(wall, at); });
@@ -270,7 +270,7 @@ void Furnisher::place_furniture() {
   }
 }
 
-void Furnisher::hang_lamps() {
+void RoomPopulator::hang_lamps() {
   const double z = world_.plan.height_m;
   int number = 0;
   for (const FloorRect& r : world_.plan.rooms) {
@@ -295,7 +295,7 @@ void Furnisher::hang_lamps() {
 }
 
 /// Half of them are people, made of boxes for legs, body, arms and head; the others are boxes.
-void Furnisher::add_movers() {
+void RoomPopulator::add_movers() {
   for (int i = 0; i < options_.movers; ++i) {
     const FloorRect& room = world_.plan.rooms[rng_.below(static_cast<std::uint32_t>(world_.plan.rooms.size()))];
     Mover mover;

@@ -21,9 +21,9 @@ struct BoxShape {
 void add_box(std::vector<Facet>& facets, const BoxShape& shape, int texture, float tint, double texture_m);
 
 /// Chooses surfaces at random and adds facets to a world.
-class Furnisher {
+class RoomPopulator {
  public:
-  Furnisher(World& world, const WorldOptions& options, const std::vector<Vec3>& path, std::uint64_t seed);
+  RoomPopulator(World& world, const WorldOptions& options, const std::vector<Vec3>& path, std::uint64_t seed);
 
   void build_shell();  ///< walls, floor, ceiling
   void hang_pictures();

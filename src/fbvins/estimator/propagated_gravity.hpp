@@ -19,7 +19,7 @@
 
 namespace fbvins {
 
-class CarriedUp {
+class PropagatedGravity {
  public:
   struct Known {
     Vec3 up_B = Vec3::UnitZ();

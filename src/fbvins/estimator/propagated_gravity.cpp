@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/carried_up.hpp"
+#include "fbvins/estimator/propagated_gravity.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -20,7 +20,7 @@ Vec3 carried(const Vec3& up_B, const ImuSegment& readings, const Vec3& gyro_bias
 
 }  // namespace
 
-void CarriedUp::carry(Time t, const ImuSegment& readings) {
+void PropagatedGravity::carry(Time t, const ImuSegment& readings) {
   now_ = t;
   if (readings.empty() || readings.longest_gap.seconds() > kReadingsGap_s) return forget();
   if (before_) before_->up_B = carried(before_->up_B, readings, before_->gyro_bias_radps);
@@ -29,7 +29,7 @@ void CarriedUp::carry(Time t, const ImuSegment& readings) {
   recent_.push_back({t, readings, {}});
 }
 
-void CarriedUp::take(const Known& known) {
+void PropagatedGravity::take(const Known& known) {
   if (recent_.empty()) return;
   recent_.back().known = known;
   auto first = std::find_if(recent_.begin(), recent_.end(), [](const Entry& e) { return e.known.has_value(); });
@@ -40,7 +40,7 @@ void CarriedUp::take(const Known& known) {
   if (agree && (now_ - recent_.front().t).seconds() >= kBefore_s) before_.reset();  // confirmed
 }
 
-void CarriedUp::keep() {
+void PropagatedGravity::keep() {
   if (!recent_.empty() && recent_.front().known) {
     before_ = recent_.front().known, since_ = recent_.front().t;
     for (auto e = std::next(recent_.begin()); e != recent_.end(); ++e)
@@ -49,18 +49,18 @@ void CarriedUp::keep() {
   recent_.clear();
 }
 
-void CarriedUp::hold() {
+void PropagatedGravity::hold() {
   if (before_) return;
   keep();
   restarted_ = false;
 }
 
-void CarriedUp::restart() {
+void PropagatedGravity::restart() {
   keep();
   restarted_ = true;
 }
 
-std::optional<CarriedUp::Difference> CarriedUp::difference(const Vec3& up_B, const Vec3& gyro_bias_radps) const {
+std::optional<PropagatedGravity::Difference> PropagatedGravity::difference(const Vec3& up_B, const Vec3& gyro_bias_radps) const {
   if (!before_) return std::nullopt;
   const double dt_s = (now_ - since_).seconds();
   const double sigma_rad =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/collect.hpp"
 
 #include <algorithm>
 
@@ -44,7 +44,7 @@ bool same(const std::shared_ptr<const Image>& a, const std::shared_ptr<const Ima
 
 }  // namespace
 
-struct EvidenceGatherer::State {
+struct EvidenceCollector::State {
   explicit State(const StereoRig& rig)
       : images(rig, kKltLevels), follower(rig.left), tracks(kFeatures), detector(kDistance_px), sampler(rig.has_right()) {
     evidence.rig = evidence.working_rig = rig;
@@ -88,7 +88,7 @@ struct EvidenceGatherer::State {
   double moving_s = 0;
 };
 
-void EvidenceGatherer::State::count_repeated(const StereoFrame& frame) {
+void EvidenceCollector::State::count_repeated(const StereoFrame& frame) {
   ++evidence.repeated.frames;
   evidence.repeated.left += same(frame.left, before.left);
   evidence.repeated.right += same(frame.right, before.right);
@@ -108,7 +108,7 @@ std::vector<StereoFrame> few_of(const std::vector<StereoFrame>& frames) {
 }  // namespace
 
 /// Matches of some of the held images, found without the extrinsics.
-std::vector<StereoView> EvidenceGatherer::State::views_of_few() {
+std::vector<StereoView> EvidenceCollector::State::views_of_few() {
   std::vector<StereoView> views;
   Pyramid left, right;
   for (const StereoFrame& frame : few_of(held)) {
@@ -122,7 +122,7 @@ std::vector<StereoView> EvidenceGatherer::State::views_of_few() {
 
 /// A lens or camera far from its calibration can look like exchanged images. Then fitting the images as named takes fewer changes
 /// of the calibration than fitting them exchanged.
-bool EvidenceGatherer::State::as_named_after_all() {
+bool EvidenceCollector::State::as_named_after_all() {
   std::vector<StereoView> views = views_of_few();
   const StereoFit as_named = fit_stereo(views, evidence.rig, nullptr, {});
   for (StereoView& view : views)
@@ -132,7 +132,7 @@ bool EvidenceGatherer::State::as_named_after_all() {
 }
 
 /// Undoes an exchange of left and right, and gives right images that are late or early to their left ones.
-void EvidenceGatherer::State::put_in_order() {
+void EvidenceCollector::State::put_in_order() {
   evidence.order = stereo_order(evidence.rig, few_of(held));
   evidence.swapped = evidence.order.swapped() && !as_named_after_all();
   if (evidence.swapped)
@@ -146,7 +146,7 @@ void EvidenceGatherer::State::put_in_order() {
 }
 
 /// Fits the stereo pair to the held images; from here on features have depths.
-void EvidenceGatherer::State::end_prelude() {
+void EvidenceCollector::State::end_prelude() {
   prelude = false;
   if (evidence.rig.has_right()) {
     put_in_order();
@@ -158,7 +158,7 @@ void EvidenceGatherer::State::end_prelude() {
   for (StereoFrame& frame : first) look(std::move(frame));
 }
 
-void EvidenceGatherer::State::look(StereoFrame frame) {
+void EvidenceCollector::State::look(StereoFrame frame) {
   FrontendStats stats;
   images.take(frame, stats);
   if (images.forget_before_gap(kLongestGap_s)) {
@@ -187,7 +187,7 @@ void EvidenceGatherer::State::look(StereoFrame frame) {
   images.advance();
 }
 
-void EvidenceGatherer::State::follow() {
+void EvidenceCollector::State::follow() {
   FrontendStats stats;
   std::vector<double> motion_px;
   for (KltTrack& track : tracks) {
@@ -200,7 +200,7 @@ void EvidenceGatherer::State::follow() {
 }
 
 /// By the median feature of those that move: what is fixed in view does not.
-void EvidenceGatherer::State::note_scene_motion() {
+void EvidenceCollector::State::note_scene_motion() {
   std::vector<double> x_px, y_px;
   for (const KltTrack& track : tracks) {
     const Vec2 moved_px = track.px - track.previous_px;
@@ -212,7 +212,7 @@ void EvidenceGatherer::State::note_scene_motion() {
   sampler.add(images.t(), moves ? Vec2(median(x_px), median(y_px)) : Vec2::Zero(), images.left(), images.right());
 }
 
-void EvidenceGatherer::State::detect() {
+void EvidenceCollector::State::detect() {
   std::vector<Vec2> occupied;
   for (const KltTrack& track : tracks) occupied.push_back(track.px);
   for (const Corner& corner :
@@ -230,7 +230,7 @@ void EvidenceGatherer::State::detect() {
 }
 
 /// Inverse: by the right image, or the depth image.
-std::optional<double> EvidenceGatherer::State::depth_of(const KltTrack& track, const StereoFrame& frame) {
+std::optional<double> EvidenceCollector::State::depth_of(const KltTrack& track, const StereoFrame& frame) {
   if (depths) {
     const auto measured = depths->at(*frame.depth, track.px);
     return measured ? std::optional(measured->value) : std::nullopt;
@@ -242,12 +242,12 @@ std::optional<double> EvidenceGatherer::State::depth_of(const KltTrack& track, c
   return found.failure == StereoFailure::none ? std::optional(found.inverse_depth) : std::nullopt;
 }
 
-void EvidenceGatherer::State::match(SeenFrame& seen, const StereoFrame& frame) {
+void EvidenceCollector::State::match(SeenFrame& seen, const StereoFrame& frame) {
   seen.has_depths = true;
   for (KltTrack& track : tracks) track.inverse_depth = depth_of(track, frame);
 }
 
-void EvidenceGatherer::State::note(SeenFrame& seen) {
+void EvidenceCollector::State::note(SeenFrame& seen) {
   for (const KltTrack& track : tracks)
     seen.features.push_back({track.id.value, track.px, seen.has_depths ? track.inverse_depth.value_or(0) : 0,
                              is_bright_dot(images.left().level(0), track.px)});
@@ -255,10 +255,10 @@ void EvidenceGatherer::State::note(SeenFrame& seen) {
   evidence.frames.push_back(std::move(seen));
 }
 
-EvidenceGatherer::EvidenceGatherer(const StereoRig& rig) : state_(std::make_unique<State>(rig)) {}
-EvidenceGatherer::~EvidenceGatherer() = default;
+EvidenceCollector::EvidenceCollector(const StereoRig& rig) : state_(std::make_unique<State>(rig)) {}
+EvidenceCollector::~EvidenceCollector() = default;
 
-bool EvidenceGatherer::push(const SensorEvent& event) {
+bool EvidenceCollector::push(const SensorEvent& event) {
   State& s = *state_;
   return std::visit(Overloaded{[&](const ImuSample& sample) {
                                  s.evidence.imu.push_back(corrected(sample, s.evidence.rig.imu_noise.axes));
@@ -269,7 +269,7 @@ bool EvidenceGatherer::push(const SensorEvent& event) {
                     event);
 }
 
-bool EvidenceGatherer::push_frame(StereoFrame frame) {
+bool EvidenceCollector::push_frame(StereoFrame frame) {
   State& s = *state_;
   s.evidence.stamps.push_back(frame.t);
   frame.offsets += own_offsets(s.evidence.rig);
@@ -288,7 +288,7 @@ bool EvidenceGatherer::push_frame(StereoFrame frame) {
   return true;
 }
 
-Evidence EvidenceGatherer::finish() {
+Evidence EvidenceCollector::finish() {
   if (state_->prelude && !state_->held.empty()) state_->end_prelude();
   state_->evidence.views = state_->sampler.take();
   return std::move(state_->evidence);

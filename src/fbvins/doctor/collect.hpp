@@ -4,7 +4,7 @@
 // line. The first seconds of images are held back until it is known which images are left ones and how the right camera is
 // oriented. One thread calls; the same events give the same evidence.
 //
-//   EvidenceGatherer gatherer(rig);
+//   EvidenceCollector gatherer(rig);
 //   while (auto event = data.next()) if (!gatherer.push(*event)) break;      // enough
 //   Evidence evidence = gatherer.finish();
 #pragma once
@@ -16,10 +16,10 @@
 
 namespace fbvins {
 
-class EvidenceGatherer {
+class EvidenceCollector {
  public:
-  explicit EvidenceGatherer(const StereoRig& rig);
-  ~EvidenceGatherer();
+  explicit EvidenceCollector(const StereoRig& rig);
+  ~EvidenceCollector();
 
   /// False once enough has been seen; later events are ignored.
   bool push(const SensorEvent& event);

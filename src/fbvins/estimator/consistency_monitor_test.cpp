@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/monitor.hpp"
+#include "fbvins/estimator/consistency_monitor.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "tests/support/simulated_flight.hpp"
 
 namespace fbvins {
-namespace monitor_test {
+namespace consistency_monitor_test {
 
 const Duration kStep = Duration::from_seconds(0.05);
 const Vec3 kBias(0.02, -0.01, 0.05);
@@ -73,22 +73,22 @@ class Scene {
 Pose<G, B> turned(double rad) { return Pose<G, B>{so3_exp(Vec3(0, 0, rad)), Vec3::Zero()}; }
 Pose<G, B> tilted(double rad) { return Pose<G, B>{so3_exp(Vec3(rad, 0, 0)), Vec3::Zero()}; }
 
-TEST(Monitor, SaysNothingWhereImagesAndReadingsAgree) {
+TEST(ConsistencyMonitor, SaysNothingWhereImagesAndReadingsAgree) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   for (int k = 0; k < 100; ++k) {
-    const Monitor::Verdict verdict = monitor.check(scene.seen({}), scene.calibration, turned(2e-4), kStep);
+    const ConsistencyMonitor::Verdict verdict = monitor.check(scene.seen({}), scene.calibration, turned(2e-4), kStep);
     EXPECT_FALSE(verdict.imu_contradicts || verdict.wrong);
   }
   EXPECT_FALSE(monitor.contradicted());
   EXPECT_TRUE(monitor.doubt({}).isZero(0));
 }
 
-TEST(Monitor, ReadingsThatTheImagesContradictCountAsMuchAsTheyAgree) {
+TEST(ConsistencyMonitor, ReadingsThatTheImagesContradictCountAsMuchAsTheyAgree) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   const Pose<G, B> truth = turned(0.02);
-  const Monitor::Verdict verdict = monitor.check(scene.seen(truth), scene.calibration, {}, kStep);
+  const ConsistencyMonitor::Verdict verdict = monitor.check(scene.seen(truth), scene.calibration, {}, kStep);
   ASSERT_TRUE(verdict.imu_contradicts);
   ASSERT_TRUE(verdict.seen);
   EXPECT_LT(so3_log((verdict.seen->q.conjugate() * truth.q).normalized()).norm(), 1e-3);
@@ -96,9 +96,9 @@ TEST(Monitor, ReadingsThatTheImagesContradictCountAsMuchAsTheyAgree) {
   EXPECT_TRUE(monitor.contradicted());
 }
 
-TEST(Monitor, SmallContradictionsAddUp) {
+TEST(ConsistencyMonitor, SmallContradictionsAddUp) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   int images = 0;
   while (images < 100 && !monitor.contradicted()) {
     (void)monitor.check(scene.seen(turned(0.005)), scene.calibration, {}, kStep);
@@ -108,9 +108,9 @@ TEST(Monitor, SmallContradictionsAddUp) {
   EXPECT_LE(images, 6) << "0.3 s";
 }
 
-TEST(Monitor, WhatMovesAllInOneDirectionAddsUpSooner) {
+TEST(ConsistencyMonitor, WhatMovesAllInOneDirectionAddsUpSooner) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   int images = 0;
   while (images < 100 && !monitor.contradicted()) {
     (void)monitor.check(scene.seen(turned(0.0012)), scene.calibration, {}, kStep);
@@ -119,12 +119,12 @@ TEST(Monitor, WhatMovesAllInOneDirectionAddsUpSooner) {
   EXPECT_LE(images, 20) << "a second, for a turn of a quarter of a pixel's standard deviation";
 }
 
-TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
+TEST(ConsistencyMonitor, OneCameraThatContradictsTheOtherIsNamed) {
   Scene scene;
   for (const bool left : {true, false}) {
-    Monitor monitor(assumed(), false);
+    ConsistencyMonitor monitor(assumed(), false);
     const Pose<G, B> wrong = turned(0.02);
-    const Monitor::Verdict verdict =
+    const ConsistencyMonitor::Verdict verdict =
         monitor.check(scene.seen(left ? wrong : Pose<G, B>{}, left ? Pose<G, B>{} : wrong), scene.calibration, {}, kStep);
     ASSERT_TRUE(verdict.wrong);
     EXPECT_EQ(verdict.wrong->left, left ? 0 : 1);
@@ -134,39 +134,39 @@ TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
   }
 }
 
-TEST(Monitor, OfFourCamerasTheOneThatContradictsIsNamed) {
+TEST(ConsistencyMonitor, OfFourCamerasTheOneThatContradictsIsNamed) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   EXPECT_FALSE(monitor.check(scene.seen_by_four({}, {}), scene.calibration, {}, kStep).wrong);
-  const Monitor::Verdict verdict = monitor.check(scene.seen_by_four({}, turned(0.02)), scene.calibration, {}, kStep);
+  const ConsistencyMonitor::Verdict verdict = monitor.check(scene.seen_by_four({}, turned(0.02)), scene.calibration, {}, kStep);
   ASSERT_TRUE(verdict.wrong);
   EXPECT_TRUE(verdict.wrong->left == 3 && verdict.wrong->right == 3);
   EXPECT_FALSE(verdict.imu_contradicts);
 }
 
-TEST(Monitor, APairThatContradictsTheOtherPairIsLeftOut) {
+TEST(ConsistencyMonitor, APairThatContradictsTheOtherPairIsLeftOut) {
   Scene scene;
-  Monitor monitor(assumed(), false);
-  const Monitor::Verdict verdict = monitor.check(scene.seen_by_four(turned(0.02), turned(0.02)), scene.calibration, {}, kStep);
+  ConsistencyMonitor monitor(assumed(), false);
+  const ConsistencyMonitor::Verdict verdict = monitor.check(scene.seen_by_four(turned(0.02), turned(0.02)), scene.calibration, {}, kStep);
   ASSERT_TRUE(verdict.wrong);
   EXPECT_TRUE(verdict.wrong->has(2) && verdict.wrong->has(3));
   EXPECT_FALSE(verdict.imu_contradicts);
 }
 
-TEST(Monitor, WhatMovesBeforeOneOfTwoPairsIsNoContradiction) {
+TEST(ConsistencyMonitor, WhatMovesBeforeOneOfTwoPairsIsNoContradiction) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   for (int k = 0; k < 60; ++k) {
-    const Monitor::Verdict verdict =
+    const ConsistencyMonitor::Verdict verdict =
         monitor.check(scene.seen_by_four(turned(0.0012), turned(0.0012)), scene.calibration, {}, kStep);
     EXPECT_FALSE(verdict.imu_contradicts || verdict.wrong) << k;
   }
   EXPECT_FALSE(monitor.contradicted());
 }
 
-TEST(Monitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
+TEST(ConsistencyMonitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   int excluded = 0, used_again = 0;
   for (int k = 0; k < 100; ++k) {
     // As with landmarks whose depth was estimated while the camera was excluded.
@@ -179,9 +179,9 @@ TEST(Monitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
   EXPECT_GE(used_again, 5) << "long enough for the window to correct its landmarks";
 }
 
-TEST(Monitor, ASmallDriftThatLastsIsAContradiction) {
+TEST(ConsistencyMonitor, ASmallDriftThatLastsIsAContradiction) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   int until = 0;
   // Of 0.014 rad/s: 3.3 standard deviations are added up, less than a contradiction at once needs.
   while (until < 100 && !monitor.check(scene.seen(turned(7e-4)), scene.calibration, {}, kStep).imu_contradicts) ++until;
@@ -189,9 +189,9 @@ TEST(Monitor, ASmallDriftThatLastsIsAContradiction) {
   EXPECT_LT(until, 60);
 }
 
-TEST(Monitor, WhereNothingExplainsTheImagesThePoseIsNotGood) {
+TEST(ConsistencyMonitor, WhereNothingExplainsTheImagesThePoseIsNotGood) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   for (int k = 0; k < 10; ++k) {  // half of the points move, and the cameras contradict each other
     (void)monitor.check(scene.seen(turned(0.03), turned(-0.03), 40, turned(0.1)), scene.calibration, {}, kStep);
     EXPECT_TRUE(k <= 3 || monitor.contradicted()) << k;
@@ -201,22 +201,22 @@ TEST(Monitor, WhereNothingExplainsTheImagesThePoseIsNotGood) {
   EXPECT_FALSE(monitor.contradicted());
 }
 
-TEST(Monitor, ALargeMovingThingIsNoContradiction) {
+TEST(ConsistencyMonitor, ALargeMovingThingIsNoContradiction) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   for (int k = 0; k < 20; ++k)  // 35 of 80 points
     EXPECT_FALSE(monitor.check(scene.seen({}, {}, 45, turned(0.03)), scene.calibration, {}, kStep).imu_contradicts);
 }
 
-TEST(Monitor, FewLandmarksProveNothing) {
+TEST(ConsistencyMonitor, FewLandmarksProveNothing) {
   Scene scene(12);
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   EXPECT_FALSE(monitor.check(scene.seen(turned(0.05)), scene.calibration, {}, kStep).imu_contradicts);
   EXPECT_FALSE(monitor.contradicted());
 }
 
 /// Images that agree, for a second, in `monitor`'s own time.
-void calm(Monitor& monitor, Scene& scene, const Vec3& accel_bias = kBias, const Vec3& gyro_bias = Vec3::Zero()) {
+void calm(ConsistencyMonitor& monitor, Scene& scene, const Vec3& accel_bias = kBias, const Vec3& gyro_bias = Vec3::Zero()) {
   for (int k = 0; k < 20; ++k) {
     (void)monitor.check(scene.seen({}), scene.calibration, {}, kStep);
     scene.now = scene.now + kStep;
@@ -225,13 +225,13 @@ void calm(Monitor& monitor, Scene& scene, const Vec3& accel_bias = kBias, const 
 }
 
 /// Until biases are compared.
-void begin(Monitor& monitor, Scene& scene) {
+void begin(ConsistencyMonitor& monitor, Scene& scene) {
   for (int k = 0; k < 4; ++k) calm(monitor, scene);
 }
 
-TEST(Monitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
+TEST(ConsistencyMonitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   begin(monitor, scene);
   (void)monitor.check(scene.seen(turned(0.02)), scene.calibration, {}, kStep);
   EXPECT_TRUE(monitor.contradicted());
@@ -249,9 +249,9 @@ TEST(Monitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
   EXPECT_FALSE(monitor.take_reset()) << "small enough for the covariance";
 }
 
-TEST(Monitor, ALargeDoubtIsToldOnceWhenTheContradictionIsOver) {
+TEST(ConsistencyMonitor, ALargeDoubtIsToldOnceWhenTheContradictionIsOver) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   begin(monitor, scene);
   for (int k = 0; k < 4; ++k) (void)monitor.check(scene.seen(turned(0.03)), scene.calibration, {}, kStep);
   EXPECT_FALSE(monitor.take_reset()) << "not yet";
@@ -259,57 +259,57 @@ TEST(Monitor, ALargeDoubtIsToldOnceWhenTheContradictionIsOver) {
   EXPECT_TRUE(monitor.take_reset());
   EXPECT_FALSE(monitor.take_reset());
   EXPECT_TRUE(monitor.doubt({}).isZero(0));
-  EXPECT_FALSE(monitor.hopeless());
+  EXPECT_FALSE(monitor.unrecoverable());
   for (int k = 0; k < 4; ++k) (void)monitor.check(scene.seen(turned(0.03)), scene.calibration, {}, kStep);
   calm(monitor, scene);
   EXPECT_TRUE(monitor.take_reset());
-  EXPECT_TRUE(monitor.hopeless()) << "two within five seconds";
+  EXPECT_TRUE(monitor.unrecoverable()) << "two within five seconds";
 }
 
-TEST(Monitor, GravityConfirmsOrRefutesATilt) {
+TEST(ConsistencyMonitor, GravityConfirmsOrRefutesATilt) {
   Scene scene;
   for (const bool right : {true, false}) {
-    Monitor monitor(assumed(), false);
+    ConsistencyMonitor monitor(assumed(), false);
     begin(monitor, scene);
     for (int k = 0; k < 4; ++k) (void)monitor.check(scene.seen(tilted(0.03)), scene.calibration, {}, kStep);
     calm(monitor, scene);
     EXPECT_TRUE(monitor.contradicted()) << "gravity has not been asked for long enough";
     calm(monitor, scene, right ? kBias : Vec3(kBias + Vec3(0, 0.15, 0)));
     calm(monitor, scene, right ? kBias : Vec3(kBias + Vec3(0, 0.15, 0)));
-    EXPECT_EQ(monitor.hopeless(), !right);
+    EXPECT_EQ(monitor.unrecoverable(), !right);
     EXPECT_EQ(monitor.contradicted(), !right);
   }
 }
 
-TEST(Monitor, ABiasThatJumpsIsAFault) {
+TEST(ConsistencyMonitor, ABiasThatJumpsIsAFault) {
   for (const bool gyro : {false, true}) {
     Scene scene;
-    Monitor monitor(assumed(), false);
+    ConsistencyMonitor monitor(assumed(), false);
     begin(monitor, scene);
     EXPECT_FALSE(monitor.contradicted());
     const Vec3 accel = kBias + Vec3(gyro ? 0 : 0.5, 0, 0), turning(0, 0, gyro ? 0.02 : 0);
     calm(monitor, scene, accel, turning);
     EXPECT_TRUE(monitor.contradicted()) << "no image contradicts it, but no bias moves so far";
-    EXPECT_FALSE(monitor.hopeless());
+    EXPECT_FALSE(monitor.unrecoverable());
     calm(monitor, scene, accel, turning);
-    EXPECT_TRUE(monitor.hopeless()) << "it stays away";
+    EXPECT_TRUE(monitor.unrecoverable()) << "it stays away";
   }
 }
 
-TEST(Monitor, TwoNewWorldsWithinSecondsAreHopeless) {
+TEST(ConsistencyMonitor, TwoNewWorldsWithinSecondsAreHopeless) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   begin(monitor, scene);
   monitor.count_reset();
   calm(monitor, scene);
-  EXPECT_FALSE(monitor.contradicted() || monitor.hopeless());
+  EXPECT_FALSE(monitor.contradicted() || monitor.unrecoverable());
   monitor.count_reset();
-  EXPECT_TRUE(monitor.hopeless());
+  EXPECT_TRUE(monitor.unrecoverable());
 }
 
-TEST(Monitor, TurnsOfTheWindowThatTheReadingsExcludeAreAContradiction) {
+TEST(ConsistencyMonitor, TurnsOfTheWindowThatTheReadingsExcludeAreAContradiction) {
   Scene scene;
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   begin(monitor, scene);
   const auto turns = [](double off_rad) { return WindowTurns{Vec3(0, 0, off_rad), 4e-4, 1, Duration::from_seconds(1)}; };
   const auto noise = [&] { return monitor.check(scene.seen({}), scene.calibration, {}, kStep).noise.gyro; };
@@ -335,17 +335,17 @@ TEST(Monitor, TurnsOfTheWindowThatTheReadingsExcludeAreAContradiction) {
   EXPECT_TRUE(monitor.doubt({}).isZero(0));
 }
 
-TEST(Monitor, DoubtedReadingsMayNotCarryAlone) {
+TEST(ConsistencyMonitor, DoubtedReadingsMayNotCarryAlone) {
   Scene scene, dark(3);
-  Monitor monitor(assumed(), false);
+  ConsistencyMonitor monitor(assumed(), false);
   begin(monitor, scene);
   (void)monitor.check(scene.seen(turned(0.05)), scene.calibration, {}, kStep);
   for (int k = 0; k < 10; ++k) (void)monitor.check(dark.seen({}), dark.calibration, {}, kStep);
-  EXPECT_TRUE(monitor.hopeless());
-  Monitor trusted(assumed(), false);
+  EXPECT_TRUE(monitor.unrecoverable());
+  ConsistencyMonitor trusted(assumed(), false);
   for (int k = 0; k < 10; ++k) (void)trusted.check(dark.seen({}), dark.calibration, {}, kStep);
-  EXPECT_FALSE(trusted.hopeless());
+  EXPECT_FALSE(trusted.unrecoverable());
 }
 
-}  // namespace monitor_test
+}  // namespace consistency_monitor_test
 }  // namespace fbvins

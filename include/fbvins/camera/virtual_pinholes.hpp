@@ -3,7 +3,7 @@
 // place, its faces: one that looks ahead and three around it, which look to the sides and behind the lens' plane. Each has the
 // part of the lens' image that shows it, axes of its own (Camera::turned) and a mask that hides what the others show.
 //
-//   const LensFaces faces(rig);
+//   const VirtualPinholes faces(rig);
 //   Estimator estimator(faces.rig(), ...);
 //   frontend.process({id, faces.spread(std::move(frame)), imu}, prior);
 //
@@ -28,10 +28,10 @@ inline constexpr double kFrontFace_rad = 55 * kDegree;
 /// keep from a mask. All have the whole image. A camera that does not see backwards has one, itself.
 std::vector<MountedCamera> faces_of(const MountedCamera& camera);
 
-class LensFaces {
+class VirtualPinholes {
  public:
   /// All cameras of the rig keep their numbers, for the face that looks ahead; the other faces follow them.
-  explicit LensFaces(const StereoRig& rig);
+  explicit VirtualPinholes(const StereoRig& rig);
 
   const StereoRig& rig() const { return rig_; }
   /// Whether a lens has faces.

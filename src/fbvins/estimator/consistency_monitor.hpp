@@ -3,7 +3,7 @@
 // the images alone give. Where they contradict each other, the rest decides who is right, and the wrong
 // one counts less, or not at all (docs/derivations/integrity.md). It decides what a measurement is worth; the window estimates.
 //
-//   const Monitor::Verdict verdict = monitor.check(landmark_observations(window, features, calibration), calibration, predicted,
+//   const ConsistencyMonitor::Verdict verdict = monitor.check(landmark_observations(window, features, calibration), calibration, predicted,
 //   dt); if (verdict.imu_contradicts) use(*verdict.seen); covariance += monitor.doubt(T_GB);
 //
 // One owner, one thread.
@@ -21,7 +21,7 @@
 
 namespace fbvins {
 
-class Monitor {
+class ConsistencyMonitor {
  public:
   struct Verdict {
     bool imu_contradicts = false;     ///< images agree with one another, but not with the readings
@@ -31,7 +31,7 @@ class Monitor {
   };
 
   /// `calibrating`: mounting or time offset are still being found, which contradict the readings, too.
-  Monitor(const ImuNoise& assumed, bool calibrating);
+  ConsistencyMonitor(const ImuNoise& assumed, bool calibrating);
 
   /// A window begins.
   void restart();
@@ -65,14 +65,14 @@ class Monitor {
   bool contradicts_now() const { return contradicted_ && calm_s_ == 0; }
   /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
   bool take_reset();
-  /// W is a new one. A second time within a few seconds is hopeless.
+  /// W is a new one. A second time within a few seconds is unrecoverable.
   void count_reset();
   /// Gravity has to confirm the tilt.
   void doubt_tilt() { tilt_.doubt(); }
   /// After darkness: the velocity is being found again.
   bool settling() const { return settling_ > 0; }
   /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
-  bool hopeless() const { return hopeless_; }
+  bool unrecoverable() const { return unrecoverable_; }
   /// Covariance of (dp in G [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
   Mat6 doubt(const Pose<G, B>& T_GB) const { return doubt_.covariance(T_GB); }
   /// And of this velocity, in G.
@@ -110,7 +110,7 @@ class Monitor {
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
   double unexplained_s_ = 0;         ///< for how long images were in contradiction with everything, less those that agreed since
   bool unexplained_ = false;
-  bool contradicted_ = false, hopeless_ = false;
+  bool contradicted_ = false, unrecoverable_ = false;
   AccumulatedDoubt doubt_;  ///< since the last reset
   TiltCheck tilt_;
   Vec3 ahead_G_ = Vec3::Zero();                     ///< from the pose to the middle of what is in view

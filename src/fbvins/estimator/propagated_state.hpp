@@ -8,14 +8,14 @@
 
 #include <optional>
 
-#include "fbvins/estimator/carried_up.hpp"
-#include "fbvins/estimator/carried_velocity.hpp"
+#include "fbvins/estimator/propagated_gravity.hpp"
+#include "fbvins/estimator/propagated_velocity.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
 
-class CarriedState {
+class PropagatedState {
  public:
   /// Of the window after a solve, beside what it holds itself.
   struct Solved {
@@ -54,9 +54,9 @@ class CarriedState {
     Mat3 velocity, gyro_bias, accel_bias;
   };
 
-  CarriedUp up_;
-  CarriedVelocity velocity_;
-  std::optional<CarriedUp::Difference> tilt_away_;  ///< of the window, from what was known before a restart or a contradiction
+  PropagatedGravity up_;
+  PropagatedVelocity velocity_;
+  std::optional<PropagatedGravity::Difference> tilt_away_;  ///< of the window, from what was known before a restart or a contradiction
   bool contradicted_before_ = false;                ///< images and readings, in the frame before
   bool disputed_ = false;                           ///< the window before was
   double unproven_s_ = 0;                           ///< so long images and readings have to agree in a new one

@@ -18,7 +18,7 @@
 
 namespace fbvins {
 
-class CarriedVelocity {
+class PropagatedVelocity {
  public:
   struct Known {
     NavState<G> state;

@@ -16,6 +16,6 @@ struct CalibrationStart {
   Vec3 turning_radps = Vec3::Zero();                                  ///< spread of the turns along their principal axes
 };
 
-Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options);
+Result<CalibrationStart> collect_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options);
 
 }  // namespace fbvins

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/carried_velocity.hpp"
+#include "fbvins/estimator/propagated_velocity.hpp"
 
 #include <gtest/gtest.h>
 
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
-namespace carried_velocity_test {
+namespace propagated_velocity_test {
 
 const Vec3 kThing(1.5, 0, 0);  ///< velocity of what fills the view, in G
 
 /// A vehicle that turns and accelerates, 20 images a second. Each image shows 40 tracks, ten of which are new.
 class Vehicle {
  public:
-  CarriedVelocity velocity;
+  PropagatedVelocity velocity;
   NavState<G> truth;
   Duration longest_gap = Duration::from_seconds(0.005);
   bool disputed = false;  ///< images contradict the readings
@@ -51,7 +51,7 @@ class Vehicle {
   double t_s_ = 0;
 };
 
-TEST(CarriedVelocity, ContradictsAThingThatFillsTheView) {
+TEST(PropagatedVelocity, ContradictsAThingThatFillsTheView) {
   Vehicle vehicle;
   vehicle.fly(3);
   vehicle.look_elsewhere();
@@ -70,7 +70,7 @@ TEST(CarriedVelocity, ContradictsAThingThatFillsTheView) {
   EXPECT_TRUE(vehicle.velocity.shift_G().isZero(0));
 }
 
-TEST(CarriedVelocity, SaysNothingOfAnotherViewThatStands) {
+TEST(PropagatedVelocity, SaysNothingOfAnotherViewThatStands) {
   Vehicle vehicle;
   for (int i = 0; i < 10; ++i) {
     vehicle.fly(1);
@@ -83,7 +83,7 @@ TEST(CarriedVelocity, SaysNothingOfAnotherViewThatStands) {
   EXPECT_FALSE(vehicle.velocity.take_reset());
 }
 
-TEST(CarriedVelocity, BelievesImagesThatShowWhatWasSeenBefore) {
+TEST(PropagatedVelocity, BelievesImagesThatShowWhatWasSeenBefore) {
   Vehicle vehicle;
   vehicle.fly(2);
   vehicle.fly(2, kThing);  // it is the readings that are wrong
@@ -96,7 +96,7 @@ TEST(CarriedVelocity, BelievesImagesThatShowWhatWasSeenBefore) {
   EXPECT_FALSE(vehicle.velocity.contradicted());
 }
 
-TEST(CarriedVelocity, AFewLandmarksProveNothing) {
+TEST(PropagatedVelocity, AFewLandmarksProveNothing) {
   Vehicle vehicle;
   vehicle.fly(2);
   vehicle.look_elsewhere();
@@ -104,7 +104,7 @@ TEST(CarriedVelocity, AFewLandmarksProveNothing) {
   EXPECT_FALSE(vehicle.velocity.contradicted());
 }
 
-TEST(CarriedVelocity, NothingIsCarriedOnWhereImagesContradictTheReadingsForLong) {
+TEST(PropagatedVelocity, NothingIsCarriedOnWhereImagesContradictTheReadingsForLong) {
   Vehicle vehicle;
   vehicle.fly(2);
   vehicle.disputed = true;
@@ -119,7 +119,7 @@ TEST(CarriedVelocity, NothingIsCarriedOnWhereImagesContradictTheReadingsForLong)
   EXPECT_FALSE(vehicle.velocity.contradicted());
 }
 
-TEST(CarriedVelocity, AVelocityThatIsHardlyKnownSaysNothing) {
+TEST(PropagatedVelocity, AVelocityThatIsHardlyKnownSaysNothing) {
   Vehicle vehicle;
   vehicle.fly(2);
   vehicle.look_elsewhere();
@@ -131,7 +131,7 @@ TEST(CarriedVelocity, AVelocityThatIsHardlyKnownSaysNothing) {
   EXPECT_TRUE(vehicle.velocity.contradicted());
 }
 
-TEST(CarriedVelocity, EndsWhereTheReadingsCannotCarryItAndTellsWhatWasMovedBy) {
+TEST(PropagatedVelocity, EndsWhereTheReadingsCannotCarryItAndTellsWhatWasMovedBy) {
   Vehicle vehicle;
   vehicle.fly(2);
   vehicle.look_elsewhere();
@@ -148,5 +148,5 @@ TEST(CarriedVelocity, EndsWhereTheReadingsCannotCarryItAndTellsWhatWasMovedBy) {
   EXPECT_TRUE(vehicle.velocity.take_reset());
 }
 
-}  // namespace carried_velocity_test
+}  // namespace propagated_velocity_test
 }  // namespace fbvins

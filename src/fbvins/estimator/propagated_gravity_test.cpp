@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/carried_up.hpp"
+#include "fbvins/estimator/propagated_gravity.hpp"
 
 #include <gtest/gtest.h>
 
 #include "fbvins/core/angle.hpp"
 
 namespace fbvins {
-namespace carried_up_test {
+namespace propagated_gravity_test {
 
 /// Where the two contradict each other.
-std::optional<Vec3> contradiction(const CarriedUp& up, const Vec3& up_B, const Vec3& gyro_bias_radps) {
+std::optional<Vec3> contradiction(const PropagatedGravity& up, const Vec3& up_B, const Vec3& gyro_bias_radps) {
   const auto difference = up.difference(up_B, gyro_bias_radps);
   return difference && difference->contradiction ? std::optional(difference->turn_B) : std::nullopt;
 }
@@ -19,7 +19,7 @@ const Vec3 kRate(0.5, -0.2, 0.3), kBias(0.01, 0.02, -0.01);
 /// A vehicle that turns steadily, whose window is good until `good_s`.
 class Turning {
  public:
-  CarriedUp up;
+  PropagatedGravity up;
   Vec3 truth() const { return so3_exp(t_s_ * kRate).conjugate() * Vec3::UnitZ(); }
   void fly(double seconds, bool good, const Vec3& tilted = Vec3::Zero()) {
     for (const double end = t_s_ + seconds; t_s_ < end - 1e-6;) {
@@ -37,7 +37,7 @@ class Turning {
   double t_s_ = 0;
 };
 
-TEST(CarriedUp, ContradictsAStartWithAnotherTilt) {
+TEST(PropagatedGravity, ContradictsAStartWithAnotherTilt) {
   Turning vehicle;
   vehicle.fly(5, true);
   vehicle.fly(0.5, false);
@@ -50,7 +50,7 @@ TEST(CarriedUp, ContradictsAStartWithAnotherTilt) {
   EXPECT_LT((so3_exp(*away) * (so3_exp(Vec3(8 * kDegree, 0, 0)) * vehicle.truth()) - vehicle.truth()).norm(), 0.002);
 }
 
-TEST(CarriedUp, IsFromTwoSecondsBeforeTheEndOfTheGoodPoses) {
+TEST(PropagatedGravity, IsFromTwoSecondsBeforeTheEndOfTheGoodPoses) {
   Turning vehicle;
   vehicle.fly(5, true);
   vehicle.fly(1.5, true, Vec3(6 * kDegree, 0, 0));  // what failed had already spoiled the tilt
@@ -59,7 +59,7 @@ TEST(CarriedUp, IsFromTwoSecondsBeforeTheEndOfTheGoodPoses) {
   EXPECT_FALSE(contradiction(vehicle.up, vehicle.truth(), kBias));
 }
 
-TEST(CarriedUp, SaysNothingWhereTheGyroscopeCannotCarryIt) {
+TEST(PropagatedGravity, SaysNothingWhereTheGyroscopeCannotCarryIt) {
   const auto other = [](const Turning& vehicle) { return so3_exp(Vec3(12 * kDegree, 0, 0)) * vehicle.truth(); };
   Turning vehicle;
   EXPECT_FALSE(contradiction(vehicle.up, other(vehicle), kBias));  // the first start
@@ -75,7 +75,7 @@ TEST(CarriedUp, SaysNothingWhereTheGyroscopeCannotCarryIt) {
   EXPECT_FALSE(contradiction(vehicle.up, other(vehicle), kBias));
 }
 
-TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPosesThatAgree) {
+TEST(PropagatedGravity, IsConfirmedByTwoSecondsOfGoodPosesThatAgree) {
   const auto remembered_after = [](double tilt_deg) {
     Turning vehicle;
     vehicle.fly(5, true);
@@ -88,7 +88,7 @@ TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPosesThatAgree) {
   EXPECT_TRUE(remembered_after(4));
 }
 
-TEST(CarriedUp, ThroughAContradictionIsFromBeforeIt) {
+TEST(PropagatedGravity, ThroughAContradictionIsFromBeforeIt) {
   const Vec3 tilt(6 * kDegree, 0, 0);
   Turning vehicle;
   vehicle.fly(5, true);
@@ -106,7 +106,7 @@ TEST(CarriedUp, ThroughAContradictionIsFromBeforeIt) {
   EXPECT_FALSE(vehicle.up.difference(vehicle.truth(), kBias)) << "confirmed";
 }
 
-TEST(CarriedUp, IsADifferenceWhereItIsNoContradiction) {
+TEST(PropagatedGravity, IsADifferenceWhereItIsNoContradiction) {
   Turning vehicle;
   vehicle.fly(5, true);
   vehicle.up.restart();
@@ -117,5 +117,5 @@ TEST(CarriedUp, IsADifferenceWhereItIsNoContradiction) {
   EXPECT_LT((so3_exp(difference->turn_B) * (so3_exp(Vec3(2 * kDegree, 0, 0)) * vehicle.truth()) - vehicle.truth()).norm(), 0.002);
 }
 
-}  // namespace carried_up_test
+}  // namespace propagated_gravity_test
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/monitor.hpp"
+#include "fbvins/estimator/consistency_monitor.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -26,19 +26,19 @@ Vec3 middle_of(const std::vector<LandmarkObservation>& observations) {
 
 }  // namespace
 
-Monitor::Monitor(const ImuNoise& assumed, bool calibrating)
+ConsistencyMonitor::ConsistencyMonitor(const ImuNoise& assumed, bool calibrating)
     : assumed_(assumed), calibrating_(calibrating), usual_shift_(kUsualShift) {}
 
-void Monitor::restart() {
+void ConsistencyMonitor::restart() {
   TiltCheck tilt = std::move(tilt_);
   const double usual_shift = usual_shift_, learned_s = learned_s_;
-  *this = Monitor(assumed_, calibrating_);
+  *this = ConsistencyMonitor(assumed_, calibrating_);
   usual_shift_ = usual_shift, learned_s_ = learned_s;
   tilt_ = std::move(tilt);
   tilt_.restart();
 }
 
-void Monitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt) {
+void ConsistencyMonitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt) {
   if (turns.sigma_rad <= 0) return;
   const double off = (turns.off_G.norm() - kTurnScale * turns.turned_rad) / (turns.sigma_rad * (calibrating_ ? kCalibrating : 1));
   if (off < (turning_noise_ > 1 ? kTurnOver_sigma : kTurnSuspected_sigma)) {
@@ -56,14 +56,14 @@ void Monitor::take(const WindowTurns& turns, const Pose<G, B>& now, Duration dt)
   calm_s_ = 0;
 }
 
-void Monitor::pass(Duration dt) {
+void ConsistencyMonitor::pass(Duration dt) {
   calm_s_ += dt.seconds();
   blind_s_ = 0;
   since_reset_s_ += dt.seconds();
   contradicted_ = contradicted_ && calm_s_ < kCalm_s;
 }
 
-void Monitor::blind(Duration dt) {
+void ConsistencyMonitor::blind(Duration dt) {
   drift_ = none();
   since_reset_s_ += dt.seconds();
   blind_s_ += dt.seconds();
@@ -72,11 +72,11 @@ void Monitor::blind(Duration dt) {
     return;
   }
   tilt_.doubt();  // readings that are doubted have to carry alone
-  hopeless_ = hopeless_ || blind_s_ > kBlind_s;
+  unrecoverable_ = unrecoverable_ || blind_s_ > kBlind_s;
 }
 
 /// `shift`: of the residuals.
-void Monitor::add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt) {
+void ConsistencyMonitor::add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt) {
   const double kept = std::exp(-dt.seconds() / kDrift_s);
   for (std::size_t c = 0; c < drift_.size(); ++c) {
     drift_[c] = kept * drift_[c] + shift[c];
@@ -91,15 +91,15 @@ void Monitor::add_drift(const OfEachCamera& shift, double focal, const Quat& pre
   lasting_s_ = std::clamp(lasting_s_ + dt.seconds() * std::min(more, 1.0), 0.0, kLasting_s);
 }
 
-double Monitor::largest_drift() const {
+double ConsistencyMonitor::largest_drift() const {
   double largest = 0;
   for (const Vec2& drift : drift_) largest = std::max(largest, drift.norm());
   return largest;
 }
 
-void Monitor::take(const BiasEstimate& biases) { hopeless_ = tilt_.take(biases, contradicted_) || hopeless_; }
+void ConsistencyMonitor::take(const BiasEstimate& biases) { unrecoverable_ = tilt_.take(biases, contradicted_) || unrecoverable_; }
 
-Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
+ConsistencyMonitor::Verdict ConsistencyMonitor::check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
                                 const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
   Verdict out;
   if (observations.size() < kFewestToJudge) {
@@ -156,20 +156,20 @@ Monitor::Verdict Monitor::check(const std::vector<LandmarkObservation>& observat
   return out;
 }
 
-void Monitor::take_agreement(double excess, Duration dt) {
+void ConsistencyMonitor::take_agreement(double excess, Duration dt) {
   evidence_ = std::max(0.0, evidence_ + excess);
   unexplained_s_ = std::max(0.0, unexplained_s_ - dt.seconds());
   unexplained_ = unexplained_ && unexplained_s_ > 0;
   pass(dt);
 }
 
-void Monitor::take_unexplained(Duration dt) {
+void ConsistencyMonitor::take_unexplained(Duration dt) {
   unexplained_s_ = std::min(kCalm_s, unexplained_s_ + dt.seconds());
   unexplained_ = unexplained_ || unexplained_s_ > kDark_s;
   blind(dt);
 }
 
-void Monitor::learn(const OfEachCamera& shift, double patience, Duration dt) {
+void ConsistencyMonitor::learn(const OfEachCamera& shift, double patience, Duration dt) {
   if (contradicted_) return;
   double largest = 0;
   for (const Vec2& of_camera : shift) largest = std::max(largest, of_camera.norm() / patience);
@@ -179,7 +179,7 @@ void Monitor::learn(const OfEachCamera& shift, double patience, Duration dt) {
 }
 
 /// What the noise of the readings and of two stamps and an uncertain velocity move all features by, in standard deviations of one.
-double Monitor::spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const {
+double ConsistencyMonitor::spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const {
   const double s = std::max(1e-3, dt.seconds());
   const double ahead_m = std::max(kNearest_m, ahead_G_.norm());
   const double by_stamps = std::sqrt(2.0) * expected_.stamp_s * (predicted.angularDistance(predicted_) / s + v_B.norm() / ahead_m);
@@ -188,7 +188,7 @@ double Monitor::spread(const Quat& predicted, const Vec3& v_B, double focal, Dur
 }
 
 /// Whether a camera that is off is left out of this image.
-bool Monitor::exclude(bool for_drift_alone, Duration dt) {
+bool ConsistencyMonitor::exclude(bool for_drift_alone, Duration dt) {
   excluded_s_ = for_drift_alone ? excluded_s_ + dt.seconds() : 0;
   if (excluded_s_ <= kReadmitted_s) return true;
   excluded_s_ = evidence_ = lasting_s_ = 0;
@@ -197,7 +197,7 @@ bool Monitor::exclude(bool for_drift_alone, Duration dt) {
 }
 
 /// The images are believed, and the readings count as much as they agree.
-void Monitor::follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Duration dt, Verdict& out) {
+void ConsistencyMonitor::follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Duration dt, Verdict& out) {
   const Vec3 turn = so3_log((predicted.q.conjugate() * seen.q).normalized());
   const Vec3 shift = seen.p - predicted.p;
   out.imu_contradicts = true;
@@ -210,12 +210,12 @@ void Monitor::follow(const Pose<G, B>& seen, const Pose<G, B>& predicted, Durati
   calm_s_ = blind_s_ = 0;
 }
 
-void Monitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G) {
+void ConsistencyMonitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G) {
   doubt_.add(predicted, turn_B, shift_G);
   tilt_.add_turn(predicted.q * turn_B);
 }
 
-bool Monitor::take_reset() {
+bool ConsistencyMonitor::take_reset() {
   if (contradicted() || !(doubt_.large() || turned_away_)) return false;
   turned_away_ = may_be_away_ = false;
   doubt_.clear();
@@ -223,8 +223,8 @@ bool Monitor::take_reset() {
   return true;
 }
 
-void Monitor::count_reset() {
-  hopeless_ = hopeless_ || since_reset_s_ < kNextReset_s;
+void ConsistencyMonitor::count_reset() {
+  unrecoverable_ = unrecoverable_ || since_reset_s_ < kNextReset_s;
   since_reset_s_ = 0;
 }
 

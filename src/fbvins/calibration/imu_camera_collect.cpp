@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/calibration/imu_camera_gather.hpp"
+#include "fbvins/calibration/imu_camera_collect.hpp"
 
 #include <fmt/format.h>
 
@@ -245,7 +245,7 @@ Result<std::vector<double>> first_offsets(const CameraPoses& poses, const GyroIn
 
 }  // namespace
 
-Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options) {
+Result<CalibrationStart> collect_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options) {
   if (const auto bad = check_input(input)) return *bad;
   const Time origin = input.imu.front().t;
   const auto located = locate_all(input, origin);

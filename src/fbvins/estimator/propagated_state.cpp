@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/estimator/carried_state.hpp"
+#include "fbvins/estimator/propagated_state.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,14 +19,14 @@ Vec3 up_B(const SlidingWindow& window) { return window.newest().state.T_FB.q.con
 
 }  // namespace
 
-void CarriedState::carry(Time t, const ImuSegment& readings) {
+void PropagatedState::carry(Time t, const ImuSegment& readings) {
   step_s_ = (t - now_).seconds();
   now_ = t;
   up_.carry(t, readings);
   velocity_.carry(readings);
 }
 
-void CarriedState::compare(const SlidingWindow& window, const Solved& solved) {
+void PropagatedState::compare(const SlidingWindow& window, const Solved& solved) {
   const NavState<G>& newest = window.newest().state;
   if (disputed_ || (unproven_s_ > 0 && solved.contradicted)) unproven_s_ = kProven_s;
   else unproven_s_ = std::max(0.0, unproven_s_ - step_s_);
@@ -42,27 +42,27 @@ void CarriedState::compare(const SlidingWindow& window, const Solved& solved) {
                     tracks_in_view(window), solved.contradicted);
 }
 
-void CarriedState::remember(const SlidingWindow& window, const Odometry& published, bool clipped) {
+void PropagatedState::remember(const SlidingWindow& window, const Odometry& published, bool clipped) {
   if (clipped) up_.forget();
   if (published.health.state != HealthState::good) return;
   up_.take(
       {up_B(window), published.tilt_sigma_rad, window.newest().state.bias.gyro_radps, sigma(published.gyro_bias_covariance)});
 }
 
-void CarriedState::restart(bool disputed) {
+void PropagatedState::restart(bool disputed) {
   disputed_ = disputed || unproven_s_ > 0;
   up_.restart();
   velocity_.restart();
 }
 
-void CarriedState::begin_window() {
+void PropagatedState::begin_window() {
   tilt_away_.reset();
   contradicted_before_ = false;
   unproven_s_ = 0;
   covariances_.reset();
 }
 
-void CarriedState::fill_covariances(Odometry& out) {
+void PropagatedState::fill_covariances(Odometry& out) {
   if (!out.pose_covariance.isZero(0)) {
     covariances_ = {out.t, out.pose_covariance, out.velocity_covariance, out.gyro_bias_covariance, out.accel_bias_covariance};
     return;
@@ -77,7 +77,7 @@ void CarriedState::fill_covariances(Odometry& out) {
   out.accel_bias_covariance = last.accel_bias;
 }
 
-void CarriedState::add_doubt(Odometry& out) const {
+void PropagatedState::add_doubt(Odometry& out) const {
   if (tilt_away_) out.pose_covariance.bottomRightCorner<3, 3>() += tilt_away_->turn_B * tilt_away_->turn_B.transpose();
   const Vec3 &shift_G = velocity_.shift_G(), &velocity_G = velocity_.velocity_G();
   out.pose_covariance.topLeftCorner<3, 3>() += shift_G * shift_G.transpose();

@@ -8,7 +8,7 @@
 #include "fbvins/frontend/orb_options.hpp"
 #include "tests/support/noise_texture.hpp"
 
-namespace fbvins::passed_wall {
+namespace fbvins::textured_wall {
 
 inline constexpr int kWidth = 376, kHeight = 240;
 inline constexpr double kDepth_m = 3.0, kSpeed_mps = 0.4, kFramePeriod_s = 0.05;
@@ -87,4 +87,4 @@ inline OrbFrontendOptions small_options() {
   return options;
 }
 
-}  // namespace fbvins::passed_wall
+}  // namespace fbvins::textured_wall

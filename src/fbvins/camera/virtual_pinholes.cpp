@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 
 #include <algorithm>
 #include <array>
@@ -126,7 +126,7 @@ std::vector<MountedCamera> faces_of(const MountedCamera& mounted) {
   return faces;
 }
 
-LensFaces::LensFaces(const StereoRig& rig) : lenses_(rig), rig_(rig) {
+VirtualPinholes::VirtualPinholes(const StereoRig& rig) : lenses_(rig), rig_(rig) {
   std::vector<MountedCamera> ahead, around;
   std::vector<int> lens_of_around;
   for (int i = 0; i < rig.camera_count(); ++i) {
@@ -152,7 +152,7 @@ LensFaces::LensFaces(const StereoRig& rig) : lenses_(rig), rig_(rig) {
   rig_ = with_cameras(rig, ahead);
 }
 
-std::shared_ptr<const Image> LensFaces::part(const std::shared_ptr<const Image>& image, int camera) const {
+std::shared_ptr<const Image> VirtualPinholes::part(const std::shared_ptr<const Image>& image, int camera) const {
   const Camera &whole = lenses_.camera(lens_of(camera)), &face = rig_.camera(camera);
   const bool is_whole = face.width() == whole.width() && face.height() == whole.height();
   if (is_whole || !image || image->width() != whole.width() || image->height() != whole.height()) return image;
@@ -162,7 +162,7 @@ std::shared_ptr<const Image> LensFaces::part(const std::shared_ptr<const Image>&
   return out;
 }
 
-StereoFrame LensFaces::spread(StereoFrame frame) const {
+StereoFrame VirtualPinholes::spread(StereoFrame frame) const {
   if (!any()) return frame;
   StereoFrame out{frame.t, part(frame.left, 0), nullptr};
   out.after_clock_step = frame.after_clock_step;
@@ -175,7 +175,7 @@ StereoFrame LensFaces::spread(StereoFrame frame) const {
   return out;
 }
 
-TrackedFrame LensFaces::gathered(TrackedFrame frame) const {
+TrackedFrame VirtualPinholes::gathered(TrackedFrame frame) const {
   for (TrackedFeature& feature : frame.features) {
     if (feature.left) feature.left->pixel += origin_px(feature.cameras.left);
     if (feature.right) feature.right->pixel += origin_px(feature.cameras.right);
@@ -187,14 +187,14 @@ TrackedFrame LensFaces::gathered(TrackedFrame frame) const {
   return frame;
 }
 
-Calibration LensFaces::of_lenses(Calibration calibration) const {
+Calibration VirtualPinholes::of_lenses(Calibration calibration) const {
   if (!any()) return calibration;
   if (!lenses_.has_right()) calibration.T_BC1 = lenses_.T_BC1;
   calibration.more.resize(lenses_.more.size());
   return calibration;
 }
 
-std::uint8_t LensFaces::lenses_of(std::uint8_t cameras) const {
+std::uint8_t VirtualPinholes::lenses_of(std::uint8_t cameras) const {
   if (!any()) return cameras;
   unsigned out = 0;
   for (int i = 0; i < rig_.camera_count(); ++i)
