@@ -20,10 +20,10 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int kPollMs = 200, kSilentPolls = 5;  ///< so long a last word waits, as it may be the reason of an end
-constexpr auto kLetItEnd = 2s;           ///< between SIGTERM and SIGKILL
-constexpr auto kAgainAfter = 1s;         ///< between a failure and the next start
-constexpr auto kLastDataWithin = 500ms;  ///< what a program sent before it ended regularly is still being read
-constexpr std::size_t kLongestLine = 2000;  ///< what is longer is cut into several
+constexpr auto kLetItEnd = 2s;                  ///< between SIGTERM and SIGKILL
+constexpr auto kAgainAfter = 1s;                ///< between a failure and the next start
+constexpr auto kLastDataWithin = 500ms;         ///< what a program sent before it ended regularly is still being read
+constexpr std::size_t kLongestLine = 2000;      ///< what is longer is cut into several
 
 /// After fork(): only what signal-safety(7) allows.
 [[noreturn]] void become(char* const* arguments, int output, pid_t parent, const std::string& not_found) {
@@ -152,7 +152,8 @@ bool BridgeProcess::run_once(Result<void>& ended) {
     if (n > 0) continue;
     dead = is_dead(status);
     if (!dead && silent >= kSilentPolls) say(words.take());
-    if (!dead && ready > 0) std::this_thread::sleep_for(std::chrono::milliseconds(kPollMs));  // it has closed its output, and lives
+    if (!dead && ready > 0)
+      std::this_thread::sleep_for(std::chrono::milliseconds(kPollMs));  // it has closed its output, and lives
   }
   close(ends[0]);
   if (!dead) terminate(status);

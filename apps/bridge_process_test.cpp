@@ -21,12 +21,13 @@ using namespace std::chrono_literals;
 /// A shell in the place of a bridge, and what is said of it.
 struct Shell {
   explicit Shell(const std::string& script)
-      : process(BridgeCommand{"oak", {"/bin/sh", "-c", script}, "depthai numpy", "/private/s"},
-                [this](const std::string& sentence) {
-                  const std::lock_guard lock(mutex);
-                  said.push_back(sentence);
-                },
-                [this] { ends = ends + 1; }) {}
+      : process(
+            BridgeCommand{"oak", {"/bin/sh", "-c", script}, "depthai numpy", "/private/s"},
+            [this](const std::string& sentence) {
+              const std::lock_guard lock(mutex);
+              said.push_back(sentence);
+            },
+            [this] { ends = ends + 1; }) {}
   std::vector<std::string> sentences() {
     const std::lock_guard lock(mutex);
     return said;
@@ -50,8 +51,8 @@ TEST(BridgeWords, OfATracebackTheLastLineIsTheReason) {
   EXPECT_EQ(words.add("connected to /private/s"), "");
   EXPECT_EQ(words.add("waiting for a camera"), "");
   EXPECT_EQ(words.add("[warning] slow port  \r"), "waiting for a camera");
-  for (const char* line : {"Traceback (most recent call last):", "  File \"x.py\", line 1, in <module>", "    a()", "OSError: first", "",
-                           "During handling of the above exception, another exception occurred:", "",
+  for (const char* line : {"Traceback (most recent call last):", "  File \"x.py\", line 1, in <module>", "    a()",
+                           "OSError: first", "", "During handling of the above exception, another exception occurred:", "",
                            "Traceback (most recent call last):", "  File \"x.py\", line 3, in <module>", "RuntimeError: busy"})
     EXPECT_EQ(words.add(line), "") << line;
   EXPECT_EQ(words.reason(), "busy");
@@ -119,9 +120,11 @@ TEST(BridgeProcess, NothingStaysOfOneThatIgnoresTheSignal) {
 }
 
 TEST(BridgeProcess, AnInterpreterThatIsNotThereIsNamed) {
-  BridgeProcess process({"oak", {"/nowhere/python3"}, "depthai numpy"}, [](const std::string&) {}, [] {});
+  BridgeProcess process(
+      {"oak", {"/nowhere/python3"}, "depthai numpy"}, [](const std::string&) {}, [] {});
   ASSERT_TRUE(soon([&] { return process.is_over(); }));
-  EXPECT_EQ(process.end().error().message, "oak: /nowhere/python3 cannot be started: install Python 3, or name it by FBVINS_PYTHON");
+  EXPECT_EQ(process.end().error().message,
+            "oak: /nowhere/python3 cannot be started: install Python 3, or name it by FBVINS_PYTHON");
 }
 
 }  // namespace bridge_process_test

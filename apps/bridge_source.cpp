@@ -53,8 +53,9 @@ Result<BridgedName> parse_name(const std::string& kind, const std::string& where
                              "--source {}",
                              kind, where, kind)};
   if (kind == "zed" && (name.mode.empty() || name.mode.find('@') != std::string::npos))
-    return Error{ErrorCode::invalid_argument,
-                 fmt::format("source '{}': a ZED is zed[:/dev/videoN]:WIDTHxHEIGHT, the size of one image, such as zed:672x376", kind)};
+    return Error{
+        ErrorCode::invalid_argument,
+        fmt::format("source '{}': a ZED is zed[:/dev/videoN]:WIDTHxHEIGHT, the size of one image, such as zed:672x376", kind)};
   return name;
 }
 
@@ -79,7 +80,8 @@ class PrivateFolder {
   std::string path_;
 };
 
-std::vector<std::string> arguments_of(const std::string& script, const std::string& socket, const Bridge& bridge, const BridgedName& name) {
+std::vector<std::string> arguments_of(const std::string& script, const std::string& socket, const Bridge& bridge,
+                                      const BridgedName& name) {
   const char* python = std::getenv("FBVINS_PYTHON");
   std::vector<std::string> arguments{python != nullptr && *python != '\0' ? python : "python3", "-u", "-B", script, socket};
   const bool is_zed = std::string_view(bridge.kind) == "zed";  // its device is the camera's, which the program does not read
@@ -98,7 +100,8 @@ class BridgeSource final : public Source {
 
   Result<void> open() {
     if (folder_.path().empty())
-      return Error{ErrorCode::unwritable, fmt::format("source '{}': no temporary folder can be made for its socket", bridge_.kind)};
+      return Error{ErrorCode::unwritable,
+                   fmt::format("source '{}': no temporary folder can be made for its socket", bridge_.kind)};
     const Result<std::string> script = bridge_script(bridge_.script);
     if (!script) return script.error();
     const std::string socket = folder_.path() + "/s";
@@ -148,7 +151,9 @@ class BridgeSource final : public Source {
     BridgeProcess& process_;
   };
 
-  bool brings_rig() const { return options_.dataset.brings_rig() || options_.uncalibrated || std::string_view(bridge_.kind) == "zed"; }
+  bool brings_rig() const {
+    return options_.dataset.brings_rig() || options_.uncalibrated || std::string_view(bridge_.kind) == "zed";
+  }
 
   Result<std::unique_ptr<Source>> open_zed(const std::string& socket, const SourceOptions& options) const {
     const std::string camera = name_.device.empty() ? "/dev/video0" : name_.device;

@@ -68,10 +68,8 @@ struct EurocSink {
 struct RecordOfInputs {
   FlightRecord record;
   template <class Event>
-    requires requires(FlightRecord& to, const Event& event) { to.add(event); }
-  Result<void> add(const Event& event) {
-    return record.add(event);
-  }
+  requires requires(FlightRecord& to, const Event& event) { to.add(event); }
+  Result<void> add(const Event& event) { return record.add(event); }
   Result<void> add_truth(Time t, const Pose<W, B>& T_WB) { return record.add_truth(t, T_WB); }
   Result<void> add_odometry(Time, const Pose<W, B>&) { return {}; }
   Result<void> finish() { return record.finish(); }
@@ -109,7 +107,8 @@ Result<Sink> make_sink(const ConvertTarget& target, const Dataset& data) {
   }
   auto folder = EurocFolder::create(out, data.rig(), "converted by fbvins");
   if (!folder) return folder.error();
-  return sink_of(std::make_shared<EurocSink>(EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}, Duration::from_seconds(data.rig().time_offset_s), {}}));
+  return sink_of(std::make_shared<EurocSink>(
+      EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}, Duration::from_seconds(data.rig().time_offset_s), {}}));
 }
 
 /// An image's camera_info goes with it, and lies where ROS's programs look for it.

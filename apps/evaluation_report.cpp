@@ -67,8 +67,9 @@ std::string to_table(const Evaluation& e, Alignment alignment) {
   text += row("relative per 1 s [m]", e.per_second_m);
   text += row("relative per 1 s [deg]", e.per_second_deg);
   if (e.longest_truth_gap_s > 0)
-    text += fmt::format("truth for {:.1f} % of the estimate's time, longest gap {:.2f} s: the errors above say nothing of the rest\n",
-                        100 * e.truth_share, e.longest_truth_gap_s);
+    text +=
+        fmt::format("truth for {:.1f} % of the estimate's time, longest gap {:.2f} s: the errors above say nothing of the rest\n",
+                    100 * e.truth_share, e.longest_truth_gap_s);
   if (e.end_drift_m) text += fmt::format("drift at the end, aligned before the first gap: {:.4f} m\n", *e.end_drift_m);
   return text;
 }

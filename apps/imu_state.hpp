@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `--imu-state FILE` of run and live: the IMU's biases and time offset are read when a flight begins and written at its regular end.
+// `--imu-state FILE` of run and live: the IMU's biases and time offset are read when a flight begins and written at its regular
+// end.
 #pragma once
 
 #include <optional>

@@ -90,8 +90,9 @@ std::string to_text(const LiveSummary& s) {
         fmt::format("the sensors' clock was set, wrapped or began again {} x: its stamps are continued by this machine's clock\n",
                     c.clock_leaps);
   if (c.clock_set_back > 0)
-    text += fmt::format("of these it was set back, or began again, {} x: what it says of the time that passed is not known, so the estimate began anew\n",
-                        c.clock_set_back);
+    text += fmt::format(
+        "of these it was set back, or began again, {} x: what it says of the time that passed is not known, so the estimate began anew\n",
+        c.clock_set_back);
   if (c.events_lost > 0) text += fmt::format("events that a slow output did not get: {}\n", c.events_lost);
   text += "images by health:";
   for (const auto& [name, images] : s.totals.health) text += fmt::format(" {} {}", name, images);

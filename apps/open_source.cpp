@@ -61,10 +61,11 @@ Result<std::unique_ptr<Source>> open_source(const std::string& name, const Sourc
         where, {.dataset = options.dataset, .laps = options.laps, .preload = options.preload, .open_file = open_any}));
 #endif
   if (kind != "replay" && kind != "socket")
-    return Error{ErrorCode::invalid_argument,
-                 fmt::format("source '{}': it is replay:DATASET[@SPEED], socket:PATH, ros2:TOPICS, v4l2:DEVICES, d435i, oak, orbbec or "
-                             "zed:WIDTHxHEIGHT (fbvins live --help)",
-                             name)};
+    return Error{
+        ErrorCode::invalid_argument,
+        fmt::format("source '{}': it is replay:DATASET[@SPEED], socket:PATH, ros2:TOPICS, v4l2:DEVICES, d435i, oak, orbbec or "
+                    "zed:WIDTHxHEIGHT (fbvins live --help)",
+                    name)};
   return make_source(name, options);
 }
 

@@ -14,12 +14,14 @@ void RecordingArguments::add_to(CLI::App& command) {
   command.add_option(
       "--calibration", calibration,
       "calibration file instead of the recording's own: of Kalibr, OpenVINS, Basalt or VINS-Fusion, or an EuRoC folder");
-  command.add_option("--imu-calibration", imu_calibration, "the IMU alone: imu.yaml of Kalibr or OpenVINS, or axes in RealSense's JSON");
+  command.add_option("--imu-calibration", imu_calibration,
+                     "the IMU alone: imu.yaml of Kalibr or OpenVINS, or axes in RealSense's JSON");
   // One argument, so that a recording which follows it is not taken for another topic.
   command.add_option_function<std::string>(
       "--topics", [this](const std::string& text) { topics = CLI::detail::split(text, ','); },
       "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU][,DEPTH]");
-  command.add_flag("--recording-time", by_recording, "of a bag: the times of recording instead of stamps that its driver did not set");
+  command.add_flag("--recording-time", by_recording,
+                   "of a bag: the times of recording instead of stamps that its driver did not set");
   command
       .add_option("--camera", camera,
                   "the cameras that are used: all (default), the first two (both), one of these, or the left "

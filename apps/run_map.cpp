@@ -130,11 +130,12 @@ Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const S
   if (!map || arguments.load.empty()) return map;
   const int loaded = (*map)->keyframes();
   if (loaded == 0)
-    warn(fmt::format("{}: a map without keyframes; of a map that was kept in flight they are in {}.journal, which is to be copied with it",
-                     arguments.load, arguments.load));
+    warn(fmt::format(
+        "{}: a map without keyframes; of a map that was kept in flight they are in {}.journal, which is to be copied with it",
+        arguments.load, arguments.load));
   if (loaded > options.max_keyframes)
-    warn(fmt::format("{}: {} keyframes, and loop.max_keyframes is {}: at the end of the flight the map keeps so many", arguments.load,
-                     loaded, options.max_keyframes));
+    warn(fmt::format("{}: {} keyframes, and loop.max_keyframes is {}: at the end of the flight the map keeps so many",
+                     arguments.load, loaded, options.max_keyframes));
   return map;
 }
 

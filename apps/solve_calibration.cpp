@@ -85,9 +85,13 @@ class RigSolver {
   }
 
   Result<void> mount_on_imu() {
-    ImuCameraInput input{
-        board_, {}, {}, material_.detections.views, readings_of(material_, outcome_.imu_noise, imu_options_.imu_axes),
-        outcome_.imu_noise, rig_variations(outcome_.cameras)};
+    ImuCameraInput input{board_,
+                         {},
+                         {},
+                         material_.detections.views,
+                         readings_of(material_, outcome_.imu_noise, imu_options_.imu_axes),
+                         outcome_.imu_noise,
+                         rig_variations(outcome_.cameras)};
     for (const CalibratedCamera& camera : outcome_.cameras.cameras) {
       input.cameras.push_back(camera.camera);
       if (!apart_) input.T_CnC0.push_back(camera.T_CnC0);

@@ -14,8 +14,8 @@
 #include <string>
 
 #include "bench/spoilt_recording.hpp"
-#include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/doctor/collect.hpp"
+#include "fbvins/doctor/common_mistakes.hpp"
 
 namespace {
 

@@ -65,7 +65,8 @@ class SyntheticTracks {
     for (auto& [corner, track] : tracks_) track.followed = false;
   }
 
-  /// At any stamp, in order, without IMU readings; the right image taken at `right_t`. `prior` is the estimator's, of some image before.
+  /// At any stamp, in order, without IMU readings; the right image taken at `right_t`. `prior` is the estimator's, of some image
+  /// before.
   TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior) { return frame_at(id, t, prior, t); }
   TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior, Time right_t) {
     TrackedFrame out;

@@ -105,11 +105,12 @@ void bind_measurements(nb::module_& m) {
 }
 
 void bind_dataset(nb::module_& m) {
-  nb::class_<Dataset>(m, "Recording",
-                      "A stereo-inertial recording, or a simulation: an iterator of ImuSample, StereoFrame and readings of other sensors in order "
-                      "of time. "
-                      "It can be iterated once: ValueError when it is begun again after its end.",
-                      nb::dynamic_attr())
+  nb::class_<Dataset>(
+      m, "Recording",
+      "A stereo-inertial recording, or a simulation: an iterator of ImuSample, StereoFrame and readings of other sensors in order "
+      "of time. "
+      "It can be iterated once: ValueError when it is begun again after its end.",
+      nb::dynamic_attr())
       .def_prop_ro("rig", &Dataset::rig, "the calibration")
       .def_prop_ro("name", [](const Dataset& d) { return d.info().name; })
       .def_prop_ro("format", [](const Dataset& d) { return d.info().format; })
@@ -130,7 +131,8 @@ void bind_dataset(nb::module_& m) {
             return nb::borrow(self);
           },
           nb::sig("def __iter__(self) -> Recording"))
-      .def("__next__", &next, nb::sig("def __next__(self) -> ImuSample | StereoFrame | RangeSample | VelocitySample | PressureSample"))
+      .def("__next__", &next,
+           nb::sig("def __next__(self) -> ImuSample | StereoFrame | RangeSample | VelocitySample | PressureSample"))
       .def("__repr__", [](const Dataset& d) {
         return fmt::format("<fbvins.Recording {} ({}), {} frames>", d.info().name, d.info().format, d.frames().size());
       });

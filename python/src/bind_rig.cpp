@@ -147,7 +147,9 @@ void bind_sensors(nb::module_& m) {
           [matrix](ImuIntrinsics* self, const std::vector<std::vector<double>>& gyro,
                    const std::vector<std::vector<double>>& accel, const std::vector<std::vector<double>>& gyro_by_force,
                    std::array<double, 3> gyro_bias, std::array<double, 3> accel_bias) {
-            ImuIntrinsics axes{matrix(gyro, "gyro"), matrix(accel, "accel"), matrix(gyro_by_force, "gyro_by_force"),
+            ImuIntrinsics axes{matrix(gyro, "gyro"),
+                               matrix(accel, "accel"),
+                               matrix(gyro_by_force, "gyro_by_force"),
                                {Vec3(gyro_bias.data()), Vec3(accel_bias.data())}};
             if (const Result<void> good = check_imu({.axes = axes}, "axes"); !good)
               throw nb::value_error(good.error().message.c_str());
@@ -158,9 +160,20 @@ void bind_sensors(nb::module_& m) {
           "accel_bias"_a = std::array<double, 3>{})
       .def_prop_ro("gyro", [rows](const ImuIntrinsics& a) { return rows(a.gyro); })
       .def_prop_ro("accel", [rows](const ImuIntrinsics& a) { return rows(a.accel); })
-      .def_prop_ro("gyro_by_force", [rows](const ImuIntrinsics& a) { return rows(a.gyro_by_force); }, "rad/s for each m/s^2")
-      .def_prop_ro("gyro_bias", [](const ImuIntrinsics& a) { return std::array{a.bias.gyro_radps.x(), a.bias.gyro_radps.y(), a.bias.gyro_radps.z()}; }, "rad/s")
-      .def_prop_ro("accel_bias", [](const ImuIntrinsics& a) { return std::array{a.bias.accel_mps2.x(), a.bias.accel_mps2.y(), a.bias.accel_mps2.z()}; }, "m/s^2");
+      .def_prop_ro(
+          "gyro_by_force", [rows](const ImuIntrinsics& a) { return rows(a.gyro_by_force); }, "rad/s for each m/s^2")
+      .def_prop_ro(
+          "gyro_bias",
+          [](const ImuIntrinsics& a) {
+            return std::array{a.bias.gyro_radps.x(), a.bias.gyro_radps.y(), a.bias.gyro_radps.z()};
+          },
+          "rad/s")
+      .def_prop_ro(
+          "accel_bias",
+          [](const ImuIntrinsics& a) {
+            return std::array{a.bias.accel_mps2.x(), a.bias.accel_mps2.y(), a.bias.accel_mps2.z()};
+          },
+          "m/s^2");
 
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")
       .def(
@@ -177,7 +190,8 @@ void bind_sensors(nb::module_& m) {
           nb::kw_only(), "gyro_noise_density"_a = ImuNoise{}.gyro_noise_density_radps_rthz,
           "accel_noise_density"_a = ImuNoise{}.accel_noise_density_mps2_rthz,
           "gyro_random_walk"_a = ImuNoise{}.gyro_random_walk_radps2_rthz,
-          "accel_random_walk"_a = ImuNoise{}.accel_random_walk_mps3_rthz, "rate_hz"_a = ImuNoise{}.rate_hz, "axes"_a.none() = nb::none())
+          "accel_random_walk"_a = ImuNoise{}.accel_random_walk_mps3_rthz, "rate_hz"_a = ImuNoise{}.rate_hz,
+          "axes"_a.none() = nb::none())
       .def_ro("gyro_noise_density", &ImuNoise::gyro_noise_density_radps_rthz, "rad/s/sqrt(Hz)")
       .def_ro("accel_noise_density", &ImuNoise::accel_noise_density_mps2_rthz, "m/s^2/sqrt(Hz)")
       .def_ro("gyro_random_walk", &ImuNoise::gyro_random_walk_radps2_rthz, "rad/s^2/sqrt(Hz)")

@@ -318,7 +318,8 @@ void bind_system(nb::module_& m) {
           "Arrays in C order are not copied, and other threads read them later: pass new arrays, do not "
           "write to them afterwards. ValueError for stamps that do not increase.")
       .def(
-          "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording, or a reading of your sensor; before the images that follow it.")
+          "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a,
+          "An event of a Recording, or a reading of your sensor; before the images that follow it.")
       .def(
           "push", [](PySystem& s, const StereoFrame& frame) { s.push(frame); }, "event"_a)
       .def(

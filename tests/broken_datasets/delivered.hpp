@@ -80,8 +80,8 @@ inline std::string deliver(Dataset& data) {
   }
   EXPECT_FALSE(data.next()) << "the end stays the end";
   const DatasetInfo& info = data.info();
-  return fmt::format("{}/{}/{}/{}", frames, left, right, imu) + (aiding > 0 ? fmt::format("/{}", aiding) : "") + rows_left_out("left", info.left.rows) +
-         rows_left_out("right", info.right.rows) + rows_left_out("imu", info.imu_rows) +
+  return fmt::format("{}/{}/{}/{}", frames, left, right, imu) + (aiding > 0 ? fmt::format("/{}", aiding) : "") +
+         rows_left_out("left", info.left.rows) + rows_left_out("right", info.right.rows) + rows_left_out("imu", info.imu_rows) +
          rows_left_out("truth", info.ground_truth_rows) + images_left_out("left", info.left) +
          images_left_out("right", info.right) +
          (info.frames_without_image > 0 ? fmt::format("; {} empty frames", info.frames_without_image) : "");

@@ -319,7 +319,8 @@ TEST(DoctorOfOneCamera, NamesTheAccelerometersBiasScaleAndAxes) {
   expect_named(biased, FindingKind::accel_bias, 1.65, 0.3);
   for (ImuSample& sample : scaled.imu) sample.accel_mps2 *= 1.15;  // less may be a bias, where the rig hardly turns over
   const Diagnosis found = examine(scaled);
-  EXPECT_TRUE(find(found, FindingKind::accel_scale) != nullptr || find(found, FindingKind::accel_bias) != nullptr) << all_of(found);
+  EXPECT_TRUE(find(found, FindingKind::accel_scale) != nullptr || find(found, FindingKind::accel_bias) != nullptr)
+      << all_of(found);
   const Mat3 M = (Mat3() << 1, 0.06, -0.05, 0, 1, 0.06, 0, 0, 1).finished();
   for (ImuSample& sample : crooked.imu) sample.accel_mps2 = M * sample.accel_mps2;
   expect_named(crooked, FindingKind::accel_alignment, 6, 2);

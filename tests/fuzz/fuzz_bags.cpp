@@ -180,8 +180,9 @@ std::vector<std::string> message_seeds() {
   std::vector<std::string> out;
   for (const int kind : {1, 2, 3, 4}) out.push_back("c" + small_message(kind, Time{1000}));
   out.push_back("c" + rectified_message());
-  for (const AidingSample& reading : {AidingSample(RangeSample{.t = Time{1000}, .distance_m = 2}), AidingSample(VelocitySample{.t = Time{1000}}),
-                                      AidingSample(PressureSample{Time{1000}, 1e5})}) {
+  for (const AidingSample& reading :
+       {AidingSample(RangeSample{.t = Time{1000}, .distance_m = 2}), AidingSample(VelocitySample{.t = Time{1000}}),
+        AidingSample(PressureSample{Time{1000}, 1e5})}) {
     out.push_back("c" + aiding_message(reading, "sensor", Encoding::cdr));
     out.push_back("1" + aiding_message(reading, "sensor", Encoding::ros1));
   }

@@ -3,9 +3,9 @@
 
 #include "fbvins/features/booster_weights.hpp"
 #include "fbvins/features/safetensors.hpp"
+#include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/csv.hpp"
-#include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -54,10 +54,11 @@ std::vector<std::string> calibration_seeds() {
 }
 
 std::vector<std::string> aiding_seeds() {
-  return {"T_BS:\n  cols: 4\n  rows: 4\n  data: [0, 0, 1, 0.02, 0, 1, 0, 0, -1, 0, 0, -0.03, 0, 0, 0, 1]\nnoise_m: 0.02\nnearest_m: 0.1\n"
-          "farthest_m: 40\nnoise_mps: [0.1, 0.1, 100]\nnoise_pa: 2\n",
-          "#timestamp [ns],distance [m]\n1000,1.5\n2000,inf\n3000,1.4\n", "1000,1,2,3\n2000,1,2,3,0.1,0.1,100\n",
-          "1000,100000\n2000,100001\n"};
+  return {
+      "T_BS:\n  cols: 4\n  rows: 4\n  data: [0, 0, 1, 0.02, 0, 1, 0, 0, -1, 0, 0, -0.03, 0, 0, 0, 1]\nnoise_m: 0.02\nnearest_m: 0.1\n"
+      "farthest_m: 40\nnoise_mps: [0.1, 0.1, 100]\nnoise_pa: 2\n",
+      "#timestamp [ns],distance [m]\n1000,1.5\n2000,inf\n3000,1.4\n", "1000,1,2,3\n2000,1,2,3,0.1,0.1,100\n",
+      "1000,100000\n2000,100001\n"};
 }
 
 std::vector<std::string> trajectory_seeds() {
@@ -77,12 +78,20 @@ std::vector<std::string> trajectory_seeds() {
 /// A row of each kind of file that other systems write.
 std::vector<std::string> known_file_seeds() {
   return {trajectory_seeds()[1],
-             "%YAML:1.0\nimu_topic: /imu0\noutput_path: /tmp\nmax_cnt: 150\nmin_dist: 30\n", "1 0 0 0 0 1 0 0 0 0 1 0\n",
-              "{\"cameraData\": [], \"imuExtrinsics\": {}}", "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
-              std::string("PK\3\4\0\0", 6), "#ROSBAG V2.0\n", "\x89PNG\r\n", std::string("\x1f\x8b\0\0", 4), "SQLite format 3"};
+          "%YAML:1.0\nimu_topic: /imu0\noutput_path: /tmp\nmax_cnt: 150\nmin_dist: 30\n",
+          "1 0 0 0 0 1 0 0 0 0 1 0\n",
+          "{\"cameraData\": [], \"imuExtrinsics\": {}}",
+          "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
+          std::string("PK\3\4\0\0", 6),
+          "#ROSBAG V2.0\n",
+          "\x89PNG\r\n",
+          std::string("\x1f\x8b\0\0", 4),
+          "SQLite format 3"};
 }
 
-std::vector<std::string> kitti_seeds() { return {"1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n1 0 0 5 0 1 0 6 0 0 1 9\n", "0.1\n0.2\n0.3\n"}; }
+std::vector<std::string> kitti_seeds() {
+  return {"1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n1 0 0 5 0 1 0 6 0 0 1 9\n", "0.1\n0.2\n0.3\n"};
+}
 
 std::vector<std::string> image_seeds() {
   return {test::make_png(1, {.width = 16, .height = 12}),
@@ -209,7 +218,8 @@ void fuzz_calibration(std::string_view bytes) {
 void fuzz_aiding(std::string_view bytes) {
   const std::string text(bytes), yaml = aiding_seeds()[0];
   for (const AidingFolder& folder : aiding_folders())
-    for (const auto& [sensor, csv] : {std::pair{text, std::string("1,100000\n")}, {text, std::string("1,2,3,4\n")}, {yaml, text}}) {
+    for (const auto& [sensor, csv] :
+         {std::pair{text, std::string("1,100000\n")}, {text, std::string("1,2,3,4\n")}, {yaml, text}}) {
       std::vector<std::string> warnings;
       const auto readings = folder.parse({YamlReader("sensor.yaml", sensor), csv, "data.csv", {}}, warnings);
       require_sentence(readings);
@@ -229,13 +239,15 @@ void fuzz_trajectory(std::string_view bytes) {
 
 void fuzz_known_file(std::string_view bytes) {
   static const NamedFile file("known");
-  if (const auto known = known_file(file.with(bytes))) require(!known->what.empty() && known->what.find('\n') == std::string::npos);
+  if (const auto known = known_file(file.with(bytes)))
+    require(!known->what.empty() && known->what.find('\n') == std::string::npos);
 }
 
 /// As poses with good times beside them, and as the times of good poses.
 void fuzz_kitti(std::string_view bytes) {
   static const NamedFile times("kitti_times.txt");
-  const std::string name = times.with(kitti_seeds()[1]), path = name.substr(0, name.size() - 10) + ".txt", poses = kitti_seeds()[0];
+  const std::string name = times.with(kitti_seeds()[1]), path = name.substr(0, name.size() - 10) + ".txt",
+                    poses = kitti_seeds()[0];
   (void)looks_like_kitti(bytes);
   const auto as_poses = kitti_with_times(bytes, path);
   require(as_poses.ok() || bytes != poses);

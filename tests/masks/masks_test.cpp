@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "fbvins/doctor/doctor.hpp"
 #include "fbvins/doctor/collect.hpp"
+#include "fbvins/doctor/doctor.hpp"
 #include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/simulation.hpp"
 

@@ -52,9 +52,7 @@ sensor_msgs::msg::Image message_of(const Image& image, Time t, std::uint32_t pad
   return message;
 }
 
-Time time_of(const SensorEvent& event) {
-  return stamp_of(event);
-}
+Time time_of(const SensorEvent& event) { return stamp_of(event); }
 
 void publish(const SensorEvent& event) {
   if (const auto* reading = std::get_if<ImuSample>(&event)) {

@@ -23,12 +23,9 @@ struct Hand {
   std::vector<Vec3> points;
 
   Hand() {
-    for (int i = 0; i < 400; ++i)
-      points.emplace_back(rng.uniform(-6, 6), rng.uniform(-4, 4), rng.uniform(2, 7));
+    for (int i = 0; i < 400; ++i) points.emplace_back(rng.uniform(-6, 6), rng.uniform(-4, 4), rng.uniform(2, 7));
   }
-  Vec3 rate(double t) const {
-    return rate_radps * Vec3(std::sin(7 * t), std::cos(5 * t + 1), 0.6 * std::sin(9 * t));
-  }
+  Vec3 rate(double t) const { return rate_radps * Vec3(std::sin(7 * t), std::cos(5 * t + 1), 0.6 * std::sin(9 * t)); }
   Vec3 position(double t) const { return moves * Vec3(0.15 * std::sin(3 * t), 0.1 * std::cos(4 * t), 0.1 * std::sin(2 * t)); }
 
   /// Images at 20 Hz with the readings between them, at 200 Hz.
@@ -38,7 +35,8 @@ struct Hand {
     for (double t = -0.5; t < seconds + 0.5; t += kStep_s)
       turned.push_back((turned.back() * so3_exp(Vec3(kStep_s * rate(t + kStep_s / 2)))).normalized());
     const auto orientation = [&](double t) {
-      const double at = std::clamp((t + 0.5) / kStep_s, 0.0, static_cast<double>(turned.size() - 2));  // of points beside the camera
+      const double at =
+          std::clamp((t + 0.5) / kStep_s, 0.0, static_cast<double>(turned.size() - 2));  // of points beside the camera
       const auto k = static_cast<std::size_t>(at);
       return turned[k].slerp(at - static_cast<double>(k), turned[k + 1]);
     };
@@ -53,7 +51,8 @@ struct Hand {
       for (int k = static_cast<int>(std::ceil(before / 0.005)); k * 0.005 <= stamp; ++k) {
         const double t = k * 0.005;  // on the images' clock; on the IMU's it is later by what the frame was cut with
         const Vec3 noise(rng.normal(), rng.normal(), rng.normal());
-        frame.imu.samples.push_back({Time{} + Duration::from_seconds(10 + t), rate(t + cut_by.seconds()) + kBias + 0.005 * noise, Vec3::Zero()});
+        frame.imu.samples.push_back(
+            {Time{} + Duration::from_seconds(10 + t), rate(t + cut_by.seconds()) + kBias + 0.005 * noise, Vec3::Zero()});
       }
       frame.imu.samples.push_back({frame.t, Vec3::Zero(), Vec3::Zero()});
       before = stamp;

@@ -51,8 +51,8 @@ inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
       add_noise(segment, {}, rng);
       Preintegration imu(ImuNoise{}, ImuBias{});
       imu.integrate(segment);
-      w.problem.factors.push_back(std::make_shared<const ImuFactor>(FrameId{k - 1}, frame.id,
-                                                                    std::make_shared<const Preintegration>(std::move(imu))));
+      w.problem.factors.push_back(
+          std::make_shared<const ImuFactor>(FrameId{k - 1}, frame.id, std::make_shared<const Preintegration>(std::move(imu))));
     }
     w.problem.frames.push_back(frame);
   }

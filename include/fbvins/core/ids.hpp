@@ -16,10 +16,10 @@ struct StrongId {
   constexpr auto operator<=>(const StrongId&) const = default;
 };
 
-using FrameId = StrongId<struct FrameTag>;        ///< a stereo image, counted from 0 in order of arrival
+using FrameId = StrongId<struct FrameTag>;  ///< a stereo image, counted from 0 in order of arrival
 /// A feature followed over frames by the frontend. Once in a frame (frame_contract.hpp); the same in all images of a group of
-/// cameras; never given to another feature, also after a restart. It stays when the other camera of the pair leads, and a landmark
-/// that is re-observed comes back under it; the estimator keeps what it knows of the landmark under it, too.
+/// cameras; never given to another feature, also after a restart. It stays when the other camera of the pair leads, and a
+/// landmark that is re-observed comes back under it; the estimator keeps what it knows of the landmark under it, too.
 using TrackId = StrongId<struct TrackTag>;
 using LandmarkId = StrongId<struct LandmarkTag>;  ///< a 3-D point of the estimator
 using KeyframeId = StrongId<struct KeyframeTag>;  ///< a frame that was chosen as keyframe

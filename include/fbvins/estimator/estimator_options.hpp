@@ -64,7 +64,8 @@ struct RangefinderOptions {
   template <class V>
   void visit(V&& v) {
     v("enabled", enabled, "", "readings of a rangefinder constrain the height above the floor");
-    v("floor_sigma_m", floor_sigma_m, "m", "standard deviation of a level floor's unevenness, in addition to the readings'", 0.001, 0.5);
+    v("floor_sigma_m", floor_sigma_m, "m", "standard deviation of a level floor's unevenness, in addition to the readings'",
+      0.001, 0.5);
   }
 };
 
@@ -76,8 +77,8 @@ struct VelocityOptions {
   template <class V>
   void visit(V&& v) {
     v("enabled", enabled, "", "readings of a sensor of velocity are used");
-    v("slip_mps", slip_mps, "m/s", "readings that are further off the predicted velocity, and by four standard deviations, are left out",
-      0.01, 10.0);
+    v("slip_mps", slip_mps, "m/s",
+      "readings that are further off the predicted velocity, and by four standard deviations, are left out", 0.01, 10.0);
   }
 };
 
@@ -89,7 +90,8 @@ struct BarometerOptions {
   template <class V>
   void visit(V&& v) {
     v("enabled", enabled, "", "readings of a barometer constrain the height");
-    v("drift_m_rts", drift_m_rts, "m/sqrt(s)", "random walk of the height that it says: weather, ventilation, its temperature", 0.001, 10.0);
+    v("drift_m_rts", drift_m_rts, "m/sqrt(s)", "random walk of the height that it says: weather, ventilation, its temperature",
+      0.001, 10.0);
   }
 };
 
@@ -106,9 +108,9 @@ struct EstimatorOptions {
   double gyro_noise_scale = 1;  ///< set by tests
   double accel_noise_scale = 1;
   double gyro_unmodelled_radps_rthz = 3.5e-4;  ///< what axes and scale leave, in addition to the calibrated noise; set by tests
-  double accel_unmodelled_mps2_rthz = 0.005;    ///< likewise
-  double gyro_walk_scale = 5.0;   ///< factors on the calibrated random walks of the biases; set by tests
-  double accel_walk_scale = 0.4;  ///< likewise
+  double accel_unmodelled_mps2_rthz = 0.005;   ///< likewise
+  double gyro_walk_scale = 5.0;                ///< factors on the calibrated random walks of the biases; set by tests
+  double accel_walk_scale = 0.4;               ///< likewise
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
   bool estimate_line_delay = false;

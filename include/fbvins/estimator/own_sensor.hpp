@@ -21,8 +21,8 @@
 
 namespace fbvins {
 
-/// The body at an image, by the estimate. G is the window's own frame: its origin and heading are those of the start, and up is not
-/// exactly z.
+/// The body at an image, by the estimate. G is the window's own frame: its origin and heading are those of the start, and up is
+/// not exactly z.
 struct BodyAtImage {
   Time t = {};
   Pose<G, B> T_GB = {};
@@ -38,8 +38,8 @@ class OwnMeasurement {
   /// What is measured less what the body's state says, in standard deviations, each number independent of the others. Always of
   /// one size. `variable`: the sensor's own, empty where it has none. Derivatives are found by differences: it has to be smooth.
   virtual Eigen::VectorXd residual(const BodyAtImage& body, const Eigen::VectorXd& variable) const = 0;
-  /// Whether it depends on velocity or biases. Such a one is lost when its image leaves the window early; others are taken over by
-  /// the image that follows.
+  /// Whether it depends on velocity or biases. Such a one is lost when its image leaves the window early; others are taken over
+  /// by the image that follows.
   virtual bool is_of_motion() const { return false; }
 };
 

@@ -36,7 +36,8 @@ struct Evaluation {
   std::optional<double> end_drift_m;
 };
 
-/// Trajectories of any frames. Relative errors are not formed across a gap of the truth. An error when no poses can be associated or they do not determine the alignment.
+/// Trajectories of any frames. Relative errors are not formed across a gap of the truth. An error when no poses can be associated
+/// or they do not determine the alignment.
 Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options);
 
 /// |p_estimate - p_truth| of each pair, m.

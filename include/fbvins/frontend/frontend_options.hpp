@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frontends by name. A new one of the library is one line in the table of frontend_options.cpp, and a group below where it has
-// options; one of your own is registered (frontend_registry.hpp). Programs and configuration files ask for the names.
+// The frontends by name. A new one of the library is one line in the table of frontend_options.cpp, and a group below where it
+// has options; one of your own is registered (frontend_registry.hpp). Programs and configuration files ask for the names.
 //
 //   for (const std::string& name : frontend_names()) offer(name);
 //   Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, options);     // or make_frontend(rig, "orb")

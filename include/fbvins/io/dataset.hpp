@@ -100,8 +100,8 @@ struct DatasetContents {
   StereoRig rig;
   DatasetInfo info;
   std::vector<TrajectoryPoint> ground_truth;
-  std::vector<ImuSample> imu;      ///< increasing stamps; in the order recorded where frames have imu_before
-  std::vector<FrameEntry> frames;  ///< the same
+  std::vector<ImuSample> imu;             ///< increasing stamps; in the order recorded where frames have imu_before
+  std::vector<FrameEntry> frames;         ///< the same
   std::vector<AidingSample> aiding = {};  ///< increasing stamps, on the IMU's clock
   std::unique_ptr<FrameLoader> loader = {};
 };

@@ -59,7 +59,7 @@ struct DatasetInfo {
   double image_rate_hz = 0, imu_rate_hz = 0;  ///< measured: one over the median interval
   Duration longest_image_gap, longest_imu_gap;
   Time longest_image_gap_start, longest_imu_gap_start;
-  int frames_without_image = 0;  ///< no camera delivered: the frame is left out (counted once met)
+  int frames_without_image = 0;   ///< no camera delivered: the frame is left out (counted once met)
   std::vector<Time> clock_steps;  ///< where the estimate begins anew, as the clock stepped back there; continued stamps
   std::vector<std::string> warnings;
   std::vector<ScaledLens> scaled;  ///< by camera

@@ -44,7 +44,7 @@ struct TrajectoryFile {
 
 /// What a file does not say itself, or says wrongly.
 struct TrajectoryFormat {
-  double unit_ns = 0;                        ///< of the stamps; 0: by their size
+  double unit_ns = 0;                          ///< of the stamps; 0: by their size
   std::optional<bool> w_first = std::nullopt;  ///< quaternions are w x y z, or x y z w; none: by the rest
 };
 /// "ns", "us", "ms" or "s" and "wxyz" or "xyzw", one of them or both with a comma between.

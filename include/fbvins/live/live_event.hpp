@@ -129,7 +129,7 @@ struct LiveMark {
 };
 
 /// Sensor events are those that the estimator consumes, in its order.
-using LiveEvent = 
+using LiveEvent =
     std::variant<ImuSample, StereoFrame, AidingSample, Odometry, LivePose, MapUpdate, LiveStatus, LiveView, LiveMark>;
 
 }  // namespace fbvins

@@ -33,7 +33,7 @@ struct MavlinkLinkState {
   std::int64_t packets_refused = 0;  ///< UDP packets of others than the flight controller
   int times_opened = 0;
   std::int64_t readings = 0;  ///< of its sensors that are used
-  std::string problem;  ///< one sentence while the port is not open, no poses can be sent or strangers send packets
+  std::string problem;        ///< one sentence while the port is not open, no poses can be sent or strangers send packets
 };
 
 class MavlinkSink final : public Sink {

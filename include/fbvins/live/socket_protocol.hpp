@@ -217,9 +217,9 @@ typedef struct FbvinsSocketAiding {
   int64_t t_ns;  ///< of the cameras' clock
   uint32_t sensor;
   uint32_t reserved;
-  double value[3];   ///< of a range: m along x, infinite where it sees nothing; of a velocity: m/s; of a pressure: Pa
-  double sigma[3];   ///< standard deviations of these; of a velocity 100 along an axis that is not measured
-  double p_BS[3], q_BS[4];  ///< where the sensor sits in the body, m, and its axes: w, x, y, z; not of a pressure
+  double value[3];               ///< of a range: m along x, infinite where it sees nothing; of a velocity: m/s; of a pressure: Pa
+  double sigma[3];               ///< standard deviations of these; of a velocity 100 along an axis that is not measured
+  double p_BS[3], q_BS[4];       ///< where the sensor sits in the body, m, and its axes: w, x, y, z; not of a pressure
   double nearest_m, farthest_m;  ///< of a range
 } FbvinsSocketAiding;
 

@@ -47,9 +47,9 @@ enum class RunMode { deterministic, threaded, live };
 
 /// Parts that a user may provide: instead of those that the options name, or from an earlier flight.
 struct SystemParts {
-  std::unique_ptr<Frontend> frontend = {};  ///< instead of `options.frontend.kind`
-  Mapper* mapper = nullptr;                 ///< gets every keyframe; not owned, must live longer than the System
-  std::optional<ImuState> imu_state = {};   ///< this IMU's biases at the end of an earlier flight
+  std::unique_ptr<Frontend> frontend = {};               ///< instead of `options.frontend.kind`
+  Mapper* mapper = nullptr;                              ///< gets every keyframe; not owned, must live longer than the System
+  std::optional<ImuState> imu_state = {};                ///< this IMU's biases at the end of an earlier flight
   std::vector<std::shared_ptr<OwnSensor>> sensors = {};  ///< that the library does not know
 };
 

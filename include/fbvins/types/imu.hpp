@@ -23,8 +23,8 @@ struct ImuNoiseScale {
 };
 
 /// The readings between two images, on the images' clock: first.t and last.t are the two image stamps (interpolated),
-/// those between are the sensor's own. Empty for the first image and where the IMU is missing. Where the time offset was corrected since
-/// the image before, first.t is where that image was taken, by the correction.
+/// those between are the sensor's own. Empty for the first image and where the IMU is missing. Where the time offset was
+/// corrected since the image before, first.t is where that image was taken, by the correction.
 struct ImuSegment {
   std::vector<ImuSample> samples;
   Duration longest_gap;  ///< longest time between neighbouring readings that overlaps the segment, its whole length

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The IMU's biases, and the time between it and the images, as estimated at the end of a flight: the prior with which the next one
-// starts.
+// The IMU's biases, and the time between it and the images, as estimated at the end of a flight: the prior with which the next
+// one starts.
 #pragma once
 
 #include <optional>

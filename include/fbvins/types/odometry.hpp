@@ -101,7 +101,7 @@ struct Odometry {
   Vec3 up_W = Vec3::UnitZ();                  ///< unit vector opposite to gravity, as estimated; z once the levelling is applied
   double tilt_sigma_rad = 0;                  ///< standard deviation of the attitude's tilt about its less certain axis
   bool level = false;                         ///< tilt_sigma_rad is below kLevelSigma_rad
-  double scale_sigma = 0;  ///< one camera: relative standard deviation of the scale; 0 with a pair or before a pose
+  double scale_sigma = 0;    ///< one camera: relative standard deviation of the scale; 0 with a pair or before a pose
   double time_offset_s = 0;  ///< t_imu = t_image + the rig's offset + this, as found so far (docs/derivations/gyro_alignment.md)
   double time_offset_sigma_s = 0;  ///< its standard deviation; 0 where it is not looked for, or not known yet
   Health health;

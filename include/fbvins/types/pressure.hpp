@@ -11,9 +11,9 @@
 namespace fbvins {
 
 struct PressureSample {
-  Time t;                    ///< on the images' clock
-  double pressure_pa = 0;    ///< absolute
-  double sigma_pa = 2;       ///< standard deviation; 12 Pa are a metre
+  Time t;                  ///< on the images' clock
+  double pressure_pa = 0;  ///< absolute
+  double sigma_pa = 2;     ///< standard deviation; 12 Pa are a metre
 };
 
 /// What makes a reading unusable however good the sensor is, in words. Empty: nothing.

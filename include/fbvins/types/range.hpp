@@ -14,11 +14,11 @@ namespace fbvins {
 
 /// Along one beam, in B.
 struct RangeSample {
-  Time t;                                 ///< on the images' clock
-  double distance_m = 0;                  ///< infinite or zero where it sees nothing
-  double sigma_m = 0.02;                  ///< standard deviation
-  Vec3 p_B = Vec3::Zero();                ///< where the beam begins, m
-  Vec3 direction_B = -Vec3::UnitZ();      ///< of length 1; down, of a body whose z is up
+  Time t;                                   ///< on the images' clock
+  double distance_m = 0;                    ///< infinite or zero where it sees nothing
+  double sigma_m = 0.02;                    ///< standard deviation
+  Vec3 p_B = Vec3::Zero();                  ///< where the beam begins, m
+  Vec3 direction_B = -Vec3::UnitZ();        ///< of length 1; down, of a body whose z is up
   double nearest_m = 0.1, farthest_m = 40;  ///< what the sensor can measure
 };
 

@@ -22,7 +22,7 @@ struct SensorPacket {
   FrameId id;
   StereoFrame frame;
   ImuSegment imu;
-  std::vector<Anchor> anchors = {};  ///< that came since the image before, of any stamp
+  std::vector<Anchor> anchors = {};       ///< that came since the image before, of any stamp
   std::vector<AidingSample> aiding = {};  ///< since the image before
 };
 
@@ -96,12 +96,12 @@ struct TrackedFrame {
   std::vector<bool> has_more = {};           ///< and of the cameras from 2 on
   ImuSegment imu;                            ///< since the frame before
   FrontendStats stats;
-  StereoFrame images;                                ///< null unless keyframes are wanted, which carry the images
-  std::shared_ptr<const DepthImage> depth = {};      ///< of a rig with a depth sensor
-  ExposureOffsets offsets = {};                      ///< of the cameras' images; filled by the system
-  std::vector<Anchor> anchors = {};                  ///< for the map
-  std::vector<AidingSample> aiding = {};             ///< since the image before; filled by the system
-  bool after_clock_step = false;                     ///< as in StereoFrame; filled by the system
+  StereoFrame images;                            ///< null unless keyframes are wanted, which carry the images
+  std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
+  ExposureOffsets offsets = {};                  ///< of the cameras' images; filled by the system
+  std::vector<Anchor> anchors = {};              ///< for the map
+  std::vector<AidingSample> aiding = {};         ///< since the image before; filled by the system
+  bool after_clock_step = false;                 ///< as in StereoFrame; filled by the system
 };
 
 /// A landmark with its last estimated position.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A reading of a sensor of velocity: wheels, optical flow over a known height, a Doppler sensor. Each reading says where the sensor
-// sits and how its axes lie, so that there may be several, and none needs an entry in the rig.
+// A reading of a sensor of velocity: wheels, optical flow over a known height, a Doppler sensor. Each reading says where the
+// sensor sits and how its axes lie, so that there may be several, and none needs an entry in the rig.
 //
 //   system.push(VelocitySample{.t = t, .v_mps = Vec3(0.8, 0, 0), .sigma_mps = Vec3(0.05, 0.05, kUnmeasured_mps)});
 #pragma once

@@ -190,8 +190,7 @@ TEST(SensorFaults, EachAltersItsTimeAndNothingElse) {
     int altered = 0;
     // Events by their own time; those lost or held back count as altered.
     std::map<std::pair<std::int64_t, std::size_t>, SensorEvent> by_time;
-    for (const auto& [when, event] : notes.events)
-      by_time[{stamp_of(event).ns / 1'000'000, event.index()}] = event;
+    for (const auto& [when, event] : notes.events) by_time[{stamp_of(event).ns / 1'000'000, event.index()}] = event;
     for (const auto& [when, event] : clean.events) {
       const auto found = by_time.find({when, event.index()});
       const bool as_it_was = found != by_time.end() && same(found->second, event);

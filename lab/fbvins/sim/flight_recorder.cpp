@@ -91,8 +91,7 @@ void FlightRecorder::join_faces(Eye& eye) {
 std::vector<Instant::Strip> FlightRecorder::strips_of(const Eye& eye, const Face& face, double first_line_s) const {
   std::vector<Instant::Strip> strips;
   for (int row = 0; row * Renderer::kTile < eye.height_px; ++row) {
-    const MotionState m =
-        motion_(first_line_s + (row * Renderer::kTile + 3.5) * options_.camera.line_delay_us * 1e-6);
+    const MotionState m = motion_(first_line_s + (row * Renderer::kTile + 3.5) * options_.camera.line_delay_us * 1e-6);
     const auto T_WC = m.T_WB * face.T_BC;
     strips.push_back({T_WC.q, T_WC.p + world_from_flight_, face.T_BC.q.conjugate() * m.w_WB_B});
   }

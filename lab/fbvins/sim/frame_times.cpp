@@ -19,8 +19,8 @@ Result<std::vector<double>> image_intervals_s(const SimulationOptions& options) 
     double ms = 0;
     const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), ms);
     if (error != std::errc() || end != number.data() + number.size() || !(ms >= 5 && ms <= 1000))
-      return Error{ErrorCode::invalid_argument,
-                   fmt::format("camera.intervals_ms = '{}': '{}' is no interval of 5 to 1000 ms", options.camera.intervals_ms, number)};
+      return Error{ErrorCode::invalid_argument, fmt::format("camera.intervals_ms = '{}': '{}' is no interval of 5 to 1000 ms",
+                                                            options.camera.intervals_ms, number)};
     intervals.push_back(1e-3 * ms);
   }
   std::ranges::sort(intervals);

@@ -79,7 +79,7 @@ bool RoomPopulator::is_clear(const Vec3& p, double radius) const {
 
 /// A rectangle on a wall: metres along it and above the floor.
 void RoomPopulator::add_panel(const Wall& wall, double from, double to, double low, double high, int texture, double texture_m,
-                          double offset, float tint) {
+                              double offset, float tint) {
   const Vec3 x = wall.along.normalized();
   Facet f;
   f.corner = wall.corner + from * x + Vec3(0, 0, high - world_.plan.height_m) + offset * wall.inward();
@@ -171,7 +171,7 @@ void RoomPopulator::add_window(const Wall& wall, double at) {
 }
 
 void RoomPopulator::lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m,
-                             int layer) {
+                                 int layer) {
   const Vec3 x(std::cos(angle), std::sin(angle), 0), y(-x.y(), x.x(), 0);
   Facet f;
   f.u = length * x;

@@ -42,7 +42,9 @@ std::vector<RangeSample> simulate_ranges(const SplineTrajectory& flight, const W
     const double truth = distance_to(world.facets, T_WB * beam.p_B + world_from_flight, T_WB.q * beam.direction_B);
     const double noisy = truth + std::hypot(o.noise_m, o.noise_share * std::min(truth, o.farthest_m)) * rng.normal();
     const double anything = rng.uniform(0.1, o.farthest_m);
-    reading.distance_m = rng.uniform(0, 1) < o.wrong_share ? anything : o.step_m > 0 ? o.step_m * std::round(noisy / o.step_m) : noisy;
+    reading.distance_m = rng.uniform(0, 1) < o.wrong_share ? anything
+                         : o.step_m > 0                    ? o.step_m * std::round(noisy / o.step_m)
+                                                           : noisy;
     if (!(reading.distance_m <= o.farthest_m)) reading.distance_m = std::numeric_limits<double>::infinity();
     out.push_back(reading);
   }

@@ -31,10 +31,10 @@ struct Instant {
   };
   Quat q_WC = Quat::Identity();
   Vec3 p_WC = Vec3::Zero();
-  Vec3 w_WC_C = Vec3::Zero();    ///< rad/s, for lines read one after the other
-  Vec3 v_WC = Vec3::Zero();      ///< m/s, in W
-  double line_s = 0;             ///< time from line to line; 0: all at once
-  Vec2 shift_px = Vec2::Zero();  ///< offset of the ray within the pixel, for antialiasing
+  Vec3 w_WC_C = Vec3::Zero();      ///< rad/s, for lines read one after the other
+  Vec3 v_WC = Vec3::Zero();        ///< m/s, in W
+  double line_s = 0;               ///< time from line to line; 0: all at once
+  Vec2 shift_px = Vec2::Zero();    ///< offset of the ray within the pixel, for antialiasing
   std::vector<Strip> strips = {};  ///< of all rows of tiles; empty: from the first line on as fast as there
 };
 

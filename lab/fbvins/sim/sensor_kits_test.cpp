@@ -107,7 +107,8 @@ TEST(SensorKits, ARollingShutterFollowsMotionThatChanges) {
   const auto row_of = [](double readout_s, double t_s, int row) {
     SimulationOptions options = with_sensors("l515");
     options.camera.line_delay_us = 1e6 * readout_s / 360, options.camera.auto_exposure = false;
-    options.camera.shot_noise = options.camera.read_noise = 0, options.camera.min_exposure_ms = options.camera.max_exposure_ms = 0.05;
+    options.camera.shot_noise = options.camera.read_noise = 0,
+    options.camera.min_exposure_ms = options.camera.max_exposure_ms = 0.05;
     options.camera.sensitivity = 2000, options.camera.time_samples = 8;
     auto simulation = prepare_simulation(options);
     EXPECT_TRUE(simulation);

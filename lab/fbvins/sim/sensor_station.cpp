@@ -54,7 +54,7 @@ const World& SensorStation::world() const { return *impl_->world; }
 Time SensorStation::start() const { return kSimulationStart; }
 TrueState SensorStation::truth() const { return impl_->truth; }
 double SensorStation::next_image_s() const { return impl_->frames.next_s(); }
-double SensorStation::longest_exposure_s() const { 
+double SensorStation::longest_exposure_s() const {
   const auto intervals = image_intervals_s(impl_->options);
   const double longer = intervals->empty() ? 1 : intervals->back() / intervals->front();
   return longer * impl_->options.camera.max_exposure_ms * 1e-3;

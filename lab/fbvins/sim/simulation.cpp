@@ -75,7 +75,8 @@ std::vector<AidingSample> simulate_aiding(const SimulationOptions& o, const Simu
   const auto seed = static_cast<std::uint64_t>(o.seed);
   const Mat3 R_BV = body_in_vehicle(s.rig, o.flight.camera_pitch_deg).conjugate().toRotationMatrix();
   std::vector<AidingSample> out;
-  for (const auto& r : simulate_ranges(s.flight, *s.world, s.world_from_flight, R_BV, o.range, s.start, seed)) out.emplace_back(r);
+  for (const auto& r : simulate_ranges(s.flight, *s.world, s.world_from_flight, R_BV, o.range, s.start, seed))
+    out.emplace_back(r);
   for (const auto& r : simulate_velocities(s.flight, R_BV, o.velocity, s.start, seed)) out.emplace_back(r);
   for (const auto& r : simulate_pressures(s.flight, o.barometer, s.start, seed)) out.emplace_back(r);
   std::ranges::stable_sort(out, {}, [](const AidingSample& r) { return stamp_of(r); });

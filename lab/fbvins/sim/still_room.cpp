@@ -61,7 +61,8 @@ std::vector<RenderedFrame> StillRoom::render(const std::vector<Pose<W, B>>& pose
   if (change.lamps == LampChange::sun) options.world.ambient = kSunlitAmbient;
   auto world = std::make_shared<const World>(changed(*world_, change, path_, poses, static_cast<std::uint64_t>(options.seed)));
   MotionState still;
-  FlightRecorder recorder(options, rig_, [&still](double) { return still; }, Vec3::Zero(), std::move(world));
+  FlightRecorder recorder(
+      options, rig_, [&still](double) { return still; }, Vec3::Zero(), std::move(world));
   std::vector<RenderedFrame> frames;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     still.T_WB = poses[i];

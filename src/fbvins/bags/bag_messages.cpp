@@ -99,7 +99,8 @@ std::optional<BagCamera::Rectified> rectified(const Camera& raw, const InfoTail&
   if (!std::isfinite(out.x_m)) return std::nullopt;
   const std::vector<double> k = raw.distortion();
   const bool same = raw.intrinsics() == out.camera.intrinsics() && raw.model_name() == "pinhole-radtan" &&
-                    std::ranges::all_of(k, [](double x) { return x == 0; }) && out.R_rectified_raw == Mat3::Identity() && out.x_m == 0;
+                    std::ranges::all_of(k, [](double x) { return x == 0; }) && out.R_rectified_raw == Mat3::Identity() &&
+                    out.x_m == 0;
   if (same) return std::nullopt;
   out.camera = cut_and_binned(out.camera, tail);
   return out;

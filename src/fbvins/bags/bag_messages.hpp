@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "fbvins/io/message_fields.hpp"
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/message_fields.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"

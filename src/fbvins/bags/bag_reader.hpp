@@ -20,10 +20,10 @@
 #include <string_view>
 #include <vector>
 
-#include "fbvins/io/message_fields.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
+#include "fbvins/io/message_fields.hpp"
 
 namespace fbvins {
 

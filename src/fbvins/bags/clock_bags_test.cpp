@@ -91,8 +91,9 @@ TEST(ClockBags, ACounterThatWrapsGoesOn) {
 
 TEST(ClockBags, ImagesAloneThatStepBackEndTheRecording) {
   const auto image = [](std::int64_t ms) { return (100'000 + ms - (ms >= 2000 ? 700 : 0)) * kMs; };
-  const Read all =
-      read_back(bag_with("images", [](std::int64_t ms) { return (100'000 + ms) * kMs; }, image), "cannot be put in time");
+  const Read all = read_back(bag_with(
+                                 "images", [](std::int64_t ms) { return (100'000 + ms) * kMs; }, image),
+                             "cannot be put in time");
   EXPECT_EQ(all.frames, 40);
   EXPECT_EQ(all.marked, 0);
   EXPECT_EQ(all.said, 1);

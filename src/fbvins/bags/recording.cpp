@@ -25,9 +25,9 @@
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
-#include "fbvins/io/side_by_side.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
 namespace {

@@ -24,7 +24,7 @@ struct RecordingOptions {
   std::string calibration = {},
               imu_calibration = {};  ///< files of any known format (calibration.hpp), instead of the recording's own
   std::vector<std::string> topics =
-      {};  ///< of a bag: the cameras' in their order, the IMU's, depth images; those missing are found
+      {};                     ///< of a bag: the cameras' in their order, the IMU's, depth images; those missing are found
   bool by_recording = false;  ///< of a bag: stamps are the times of recording
 };
 

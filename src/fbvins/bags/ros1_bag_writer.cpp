@@ -212,7 +212,8 @@ Result<void> Ros1BagWriter::add(const AidingSample& of_images) {
     sensor = &state_->aiding.add(reading, state_->all.size());
     state_->all.push_back(ros1::aiding_topic("/" + sensor->name, reading));
     if (sensor->T_BS)
-      if (Result<void> done = state_->add(ros1::kTransforms, t, ros1::transform_message(t, sensor->name, *sensor->T_BS)); !done) return done;
+      if (Result<void> done = state_->add(ros1::kTransforms, t, ros1::transform_message(t, sensor->name, *sensor->T_BS)); !done)
+        return done;
   }
   const std::string_view frame = sensor->T_BS ? std::string_view(sensor->name) : kBodyFrame;
   return state_->add(static_cast<std::uint32_t>(sensor->topic), t, aiding_message(reading, frame, Encoding::ros1));

@@ -113,10 +113,12 @@ Topic aiding_topic(const std::string& name, const AidingSample& reading) {
       kTwistWithCovariance{"geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"};
   return std::visit(
       Overloaded{[&](const RangeSample&) {
-                   return Topic{name, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148",
-                                definition("uint8 ULTRASOUND=0\nuint8 INFRARED=1\nHeader header\nuint8 radiation_type\nfloat32 field_of_view\n"
-                                           "float32 min_range\nfloat32 max_range\nfloat32 range\n",
-                                           {kHeader})};
+                   return Topic{
+                       name, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148",
+                       definition(
+                           "uint8 ULTRASOUND=0\nuint8 INFRARED=1\nHeader header\nuint8 radiation_type\nfloat32 field_of_view\n"
+                           "float32 min_range\nfloat32 max_range\nfloat32 range\n",
+                           {kHeader})};
                  },
                  [&](const VelocitySample&) {
                    return Topic{name, "geometry_msgs/TwistWithCovarianceStamped", "8927a1a12fb2607ceea095b2dc440a96",

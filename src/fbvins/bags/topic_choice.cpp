@@ -159,7 +159,8 @@ Result<ChosenTopics> sorted_by_kind(const BagContents& contents, const std::vect
       if (std::ranges::find(out.aiding, topic) != out.aiding.end()) return twice("sensors of one name");
       out.aiding.push_back(topic);
     } else {
-      const std::string aiding = contents.aiding.empty() ? "" : fmt::format(", of other sensors on {}", listed(names(contents.aiding)));
+      const std::string aiding =
+          contents.aiding.empty() ? "" : fmt::format(", of other sensors on {}", listed(names(contents.aiding)));
       return Error{ErrorCode::not_found,
                    fmt::format("there are neither images nor IMU readings on '{}'; there are images on {}, "
                                "readings on {}{}",

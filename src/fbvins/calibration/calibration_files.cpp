@@ -75,7 +75,8 @@ Result<BasaltAxes> basalt_axes(const ImuIntrinsics& axes) {
   const Vec3 ba = accel * axes.bias.accel_mps2, bg = gyro * axes.bias.gyro_radps;
   constexpr double kNone = 1e-9;
   if (Vec3(S(0, 1), S(0, 2), S(1, 2)).cwiseAbs().maxCoeff() > kNone || axes.gyro_by_force.cwiseAbs().maxCoeff() > kNone)
-    return Error{ErrorCode::unsupported, "Basalt has no model of an accelerometer turned against the IMU, nor of a gyroscope that feels forces"};
+    return Error{ErrorCode::unsupported,
+                 "Basalt has no model of an accelerometer turned against the IMU, nor of a gyroscope that feels forces"};
   return BasaltAxes{{ba.x(), ba.y(), ba.z(), S(0, 0), S(1, 0), S(2, 0), S(1, 1), S(2, 1), S(2, 2)},
                     {bg.x(), bg.y(), bg.z(), G(0, 0), G(1, 0), G(2, 0), G(0, 1), G(1, 1), G(2, 1), G(0, 2), G(1, 2), G(2, 2)}};
 }
@@ -147,12 +148,13 @@ std::string to_kalibr_imu(const ImuNoise& noise) {
     ranges += fmt::format("gyroscope_range: {}\n", kalibr_number(noise.max_gyro_radps));
   if (noise.max_accel_mps2 != usual.max_accel_mps2)
     ranges += fmt::format("accelerometer_range: {}\n", kalibr_number(noise.max_accel_mps2));
-  return ranges + fmt::format(
-                      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
-                      "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
-                      kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
-                      kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
-                      kalibr_number(noise.rate_hz)) +
+  return ranges +
+         fmt::format(
+             "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
+             "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
+             kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
+             kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
+             kalibr_number(noise.rate_hz)) +
          imu_axes_text(noise.axes, "", false);
 }
 

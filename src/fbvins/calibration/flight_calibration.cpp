@@ -132,9 +132,8 @@ double total_gain(const FlightCalibration& found) {
 
 /// Why the calibration stays as given; empty where it does not.
 std::string objection_to(const FlightCalibration& found, bool changed, double least_gain) {
-  const bool determined = std::any_of(found.parameters.begin(), found.parameters.end(), [](const RefinedParameter& p) {
-    return p.finding != FlightFinding::not_determined;
-  });
+  const bool determined = std::any_of(found.parameters.begin(), found.parameters.end(),
+                                      [](const RefinedParameter& p) { return p.finding != FlightFinding::not_determined; });
   if (!determined) return "these flights determine no parameter: the calibration stays as given";
   if (!changed) return "what these flights determine is as given: the calibration stays";
   for (const HeldOutPart& part : found.held_out)

@@ -5,8 +5,8 @@
 
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/camera/check_rig.hpp"
-#include "fbvins/camera/virtual_pinholes.hpp"
 #include "fbvins/camera/scaled_lens.hpp"
+#include "fbvins/camera/virtual_pinholes.hpp"
 
 namespace fbvins {
 namespace camera_times_test {

@@ -93,20 +93,23 @@ std::pair<double, double> stretch(const Mat3& m) {
 
 Result<void> check_axes(const ImuIntrinsics& axes, std::string_view origin) {
   for (const auto& [matrix, name] : {std::pair(&axes.gyro, "gyroscope"), {&axes.accel, "accelerometer"}}) {
-    if (!matrix->allFinite()) return malformed(origin, fmt::format("the {}'s scale and axes have a number that is not finite", name));
+    if (!matrix->allFinite())
+      return malformed(origin, fmt::format("the {}'s scale and axes have a number that is not finite", name));
     const auto [least, most] = stretch(*matrix);
     if (!(least >= kSmallestScale) || !(most <= 1 / kSmallestScale))
-      return malformed(origin, fmt::format("the {}'s scale is {:.2f} to {:.2f}, not {} to {:.2f}: no IMU reads so; is the unit another "
-                                           "one, or was the calibration not determined?",
-                                           name, least, most, kSmallestScale, 1 / kSmallestScale));
+      return malformed(origin,
+                       fmt::format("the {}'s scale is {:.2f} to {:.2f}, not {} to {:.2f}: no IMU reads so; is the unit another "
+                                   "one, or was the calibration not determined?",
+                                   name, least, most, kSmallestScale, 1 / kSmallestScale));
     if (!(matrix->determinant() > 0)) return malformed(origin, fmt::format("the {}'s axes are left-handed", name));
   }
   if (!(axes.gyro_by_force.cwiseAbs().maxCoeff() <= kLargestByForce))
-    return malformed(origin, fmt::format("the gyroscope's sensitivity to forces is more than {} rad/s for each m/s^2", kLargestByForce));
+    return malformed(origin,
+                     fmt::format("the gyroscope's sensitivity to forces is more than {} rad/s for each m/s^2", kLargestByForce));
   if (!(axes.bias.gyro_radps.cwiseAbs().maxCoeff() <= kLargestGyroBias_radps) ||
       !(axes.bias.accel_mps2.cwiseAbs().maxCoeff() <= kLargestAccelBias_mps2))
-    return malformed(origin, fmt::format("the IMU's bias is more than {} rad/s or {} m/s^2", kLargestGyroBias_radps,
-                                         kLargestAccelBias_mps2));
+    return malformed(
+        origin, fmt::format("the IMU's bias is more than {} rad/s or {} m/s^2", kLargestGyroBias_radps, kLargestAccelBias_mps2));
   return {};
 }
 

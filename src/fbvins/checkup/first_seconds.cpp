@@ -21,10 +21,10 @@ constexpr std::size_t kKept = 3;
 
 void FirstSeconds::push(const SensorEvent& event) {
   if (is_over()) return;
-  std::visit(Overloaded{[this](const ImuSample& sample) { samples_.push_back(sample); },
-                        [](const AidingSample&) {},  // not examined
-                        [this](const StereoFrame& frame) { keep(frame); }},
-             event);
+  std::visit(
+      Overloaded{[this](const ImuSample& sample) { samples_.push_back(sample); }, [](const AidingSample&) {},  // not examined
+                 [this](const StereoFrame& frame) { keep(frame); }},
+      event);
 }
 
 void FirstSeconds::keep(const StereoFrame& frame) {

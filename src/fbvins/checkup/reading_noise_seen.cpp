@@ -68,7 +68,8 @@ std::optional<ReadingNoiseSeen> reading_noise_seen(std::span<const ImuSample> sa
     if (!(white.gyro_radps_rthz > 0) || !(white.accel_mps2_rthz > 0)) continue;  // readings that repeat
     const auto less = [](double& least, double value) { least = least == 0 ? value : std::min(least, value); };
     less(seen.quietest.gyro_radps_rthz, white.gyro_radps_rthz), less(seen.quietest.accel_mps2_rthz, white.accel_mps2_rthz);
-    if (white.accel_mps2_rthz < kWithoutRotors && all.gyro_radps_rthz < kRestSpread * white.gyro_radps_rthz && all.accel_mps2_rthz < kRestSpread * white.accel_mps2_rthz)
+    if (white.accel_mps2_rthz < kWithoutRotors && all.gyro_radps_rthz < kRestSpread * white.gyro_radps_rthz &&
+        all.accel_mps2_rthz < kRestSpread * white.accel_mps2_rthz)
       rest.push_back(white);
   }
   if (seen.quietest.gyro_radps_rthz == 0) return std::nullopt;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The white noise that readings show, against what the calibration declares. Motion and vibration add to it, so that a figure that
-// is too large is seen anywhere, one that is too small only at rest. Pure functions, any thread.
+// The white noise that readings show, against what the calibration declares. Motion and vibration add to it, so that a figure
+// that is too large is seen anywhere, one that is too small only at rest. Pure functions, any thread.
 //
 //   if (const auto seen = reading_noise_seen(samples)) compare(seen->quietest, declared);
 #pragma once
@@ -18,8 +18,8 @@ struct Densities {
 };
 
 struct ReadingNoiseSeen {
-  Densities quietest;                        ///< of the quietest half second, vibration included
-  std::optional<Densities> at_rest = {};     ///< of the time at rest, if there is enough of it
+  Densities quietest;                     ///< of the quietest half second, vibration included
+  std::optional<Densities> at_rest = {};  ///< of the time at rest, if there is enough of it
 };
 
 /// None for less than three seconds of readings.

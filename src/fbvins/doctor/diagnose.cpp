@@ -6,9 +6,9 @@
 #include <cmath>
 #include <utility>
 
+#include "fbvins/doctor/collect.hpp"
 #include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/doctor/diagnose.hpp"
-#include "fbvins/doctor/collect.hpp"
 #include "fbvins/doctor/rig_diagnosis.hpp"
 
 namespace fbvins {

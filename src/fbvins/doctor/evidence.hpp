@@ -59,14 +59,14 @@ struct StereoStep {
 };
 
 struct Evidence {
-  StereoRig rig;          ///< as calibrated
-  StereoRig working_rig;  ///< corrected by a stereo fit to the first seconds: good enough for depths
-  StereoOrder order;      ///< of the first seconds' images
-  bool swapped = false;   ///< left and right images were exchanged, and all that follows has them in order
-  StereoStep step;        ///< right images that were late or early are in order as well
+  StereoRig rig;               ///< as calibrated
+  StereoRig working_rig;       ///< corrected by a stereo fit to the first seconds: good enough for depths
+  StereoOrder order;           ///< of the first seconds' images
+  bool swapped = false;        ///< left and right images were exchanged, and all that follows has them in order
+  StereoStep step;             ///< right images that were late or early are in order as well
   std::vector<ImuSample> imu;  ///< corrected by the calibration's axes
-  std::vector<Time> stamps;  ///< of all stereo images
-  bool untriggered = false;  ///< right images were taken at other times than left ones, as their stamps say
+  std::vector<Time> stamps;    ///< of all stereo images
+  bool untriggered = false;    ///< right images were taken at other times than left ones, as their stamps say
   std::vector<SeenFrame> frames;
   std::vector<StereoView> stereo;
   std::vector<SmallView> views;  ///< of the times at which the scene had moved, over the whole recording

@@ -74,10 +74,10 @@ void Examination::readings() {
     keep(check_vibration(evidence_.imu));
   }
   if (const auto seen = reading_noise_seen(evidence_.imu))
-    measured(fmt::format("noise of the readings: at most {:.2g} rad/s and {:.2g} m/s^2 per sqrt(Hz), the calibration says {:.2g} and {:.2g}",
-                         seen->quietest.gyro_radps_rthz, seen->quietest.accel_mps2_rthz,
-                         evidence_.rig.imu_noise.gyro_noise_density_radps_rthz,
-                         evidence_.rig.imu_noise.accel_noise_density_mps2_rthz));
+    measured(fmt::format(
+        "noise of the readings: at most {:.2g} rad/s and {:.2g} m/s^2 per sqrt(Hz), the calibration says {:.2g} and {:.2g}",
+        seen->quietest.gyro_radps_rthz, seen->quietest.accel_mps2_rthz, evidence_.rig.imu_noise.gyro_noise_density_radps_rthz,
+        evidence_.rig.imu_noise.accel_noise_density_mps2_rthz));
   const GravitySeen gravity = gravity_seen(evidence_.imu);
   const Vibration vibration = measure_vibration(evidence_.imu);
   measured(fmt::format(

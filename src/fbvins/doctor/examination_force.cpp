@@ -33,10 +33,7 @@ const std::vector<ChangeGroup>& groups() {
       {FindingKind::accel_scale, WhichLens::left, {kAxis}, 0.03, 1.01},
       {FindingKind::accel_scale, WhichLens::left, {kAxis + 1}, 0.03, 1.01},
       {FindingKind::accel_scale, WhichLens::left, {kAxis + 2}, 0.03, 1.01},
-      {FindingKind::accel_alignment,
-       WhichLens::left,
-       {kCross, kCross + 1, kCross + 2, kCross + 3, kCross + 4, kCross + 5},
-       0.03},
+      {FindingKind::accel_alignment, WhichLens::left, {kCross, kCross + 1, kCross + 2, kCross + 3, kCross + 4, kCross + 5}, 0.03},
   };
   return all;
 }
@@ -63,7 +60,8 @@ void Examination::force() {
   std::optional<BlockSolution> last = problem.windows() < kFewestWindows ? std::nullopt : problem.converge();
   const double with_bias_px = problem.typical_error();
   if (!last || problem.windows() < kFewestWindows || with_bias_px > kMostError_px) {
-    if (!has_depths()) not_judged("scale, bias and axes of the accelerometer: too few tracks, or the readings do not predict them");
+    if (!has_depths())
+      not_judged("scale, bias and axes of the accelerometer: too few tracks, or the readings do not predict them");
     return;
   }
   std::vector<const ChangeGroup*> found{&kBiasGroup};
@@ -73,7 +71,8 @@ void Examination::force() {
     const Amount amount = amount_of(*best->group, best->fit, best->solution);
     const double before_px = problem.typical_error(), after_px = best->fit.typical_error();
     measured(fmt::format("  force: {} {:.3f} +- {:.3f}, {:.1f} sigmas, error {:.2f} -> {:.2f} px", to_string(best->group->kind),
-                         amount.value.norm(), amount.covariance.diagonal().cwiseSqrt().norm(), amount.sigmas(), before_px, after_px));
+                         amount.value.norm(), amount.covariance.diagonal().cwiseSqrt().norm(), amount.sigmas(), before_px,
+                         after_px));
     if (amount.sigmas() <= kSignificant || after_px > kLeaves * before_px) break;
     found.push_back(best->group);
     last = best->solution;
@@ -83,8 +82,8 @@ void Examination::force() {
   const Eigen::VectorXd sigma = bias.covariance.diagonal().cwiseSqrt();
   measured(fmt::format(
       "tracks predicted by the readings ({} windows): error {:.2f} px, after the changes {:.2f}; accelerometer's bias by them ({:.2f} +- {:.2f}, {:.2f} +- {:.2f}, {:.2f} +- {:.2f})",
-      problem.windows(), with_bias_px, problem.typical_error(), -bias.value(0), sigma(0), -bias.value(1), sigma(1), -bias.value(2),
-      sigma(2)));
+      problem.windows(), with_bias_px, problem.typical_error(), -bias.value(0), sigma(0), -bias.value(1), sigma(1),
+      -bias.value(2), sigma(2)));
   for (const ChangeGroup* group : found) {
     const Amount amount = amount_of(*group, problem, *last);
     const double sigma_max = amount.covariance.diagonal().cwiseSqrt().maxCoeff();
@@ -102,8 +101,8 @@ void Examination::force_change(const ChangeGroup& group, const Amount& amount) {
     std::erase_if(out_.not_judged, [](const std::string& text) { return text.starts_with("the accelerometer's bias"); });
     const Vec3 bias = -amount.value;
     Finding& finding = found(group.kind, bias.norm(), sigma, "m/s^2");
-    finding.measured = fmt::format("the accelerometer's bias is ({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", bias.x(), bias.y(),
-                                   bias.z(), sigma);
+    finding.measured =
+        fmt::format("the accelerometer's bias is ({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", bias.x(), bias.y(), bias.z(), sigma);
     finding.expected = "less than 1 m/s^2";
     finding.advice = "calibrate the accelerometer in six positions, or subtract this from its readings";
   } else if (group.kind == FindingKind::accel_scale && !has_depths()) {
@@ -111,7 +110,8 @@ void Examination::force_change(const ChangeGroup& group, const Amount& amount) {
     const double factor = std::exp(amount.value(0));
     const std::string along = axis < 0 ? "" : fmt::format(" along {}", "xyz"[axis]);
     Finding& finding = found(group.kind, 100 * (1 / factor - 1), 100 * sigma, "%");
-    finding.measured = fmt::format("the accelerometer's readings{} are {:.1f} +- {:.1f} % too large", along, finding.size, finding.sigma);
+    finding.measured =
+        fmt::format("the accelerometer's readings{} are {:.1f} +- {:.1f} % too large", along, finding.size, finding.sigma);
     finding.expected = "within 3 %, and gravity is 9.81 m/s^2";
     finding.advice = fmt::format("multiply the accelerometer's readings{} by {:.4f}, or look up its range", along, factor);
   } else if (group.kind == FindingKind::accel_alignment) {
@@ -120,7 +120,8 @@ void Examination::force_change(const ChangeGroup& group, const Amount& amount) {
         "the accelerometer's axes are not square, or not the gyroscope's: true force = (1 {:+.3f} {:+.3f}; {:+.3f} 1 {:+.3f}; {:+.3f} {:+.3f} 1) reading, +- {:.3f}",
         amount.value(0), amount.value(1), amount.value(2), amount.value(3), amount.value(4), amount.value(5), sigma);
     finding.expected = "less than 3 % of one axis in another";
-    finding.advice = "calibrate scale and axes of the IMU (fbvins calibrate --imu-axes, rs-imu-calibration), and give them to the calibration";
+    finding.advice =
+        "calibrate scale and axes of the IMU (fbvins calibrate --imu-axes, rs-imu-calibration), and give them to the calibration";
   }
 }
 

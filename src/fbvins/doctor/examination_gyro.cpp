@@ -44,11 +44,12 @@ ImuSeries with_scale_of(const MotionFit& fit, const ImuSeries& imu) {
 
 }  // namespace
 
-/// Without depths times and mounting are found by themselves, with the lens and the gyroscope's scale that fit best: a residual that
-/// measures to epipolar lines alone makes offsets of what it cannot explain. What is not certainly wrong stays as given.
+/// Without depths times and mounting are found by themselves, with the lens and the gyroscope's scale that fit best: a residual
+/// that measures to epipolar lines alone makes offsets of what it cannot explain. What is not certainly wrong stays as given.
 MotionFit Examination::fit_with_gyro() const {
   MotionFit given = fit_motion(pairs_, imu_, {rig_, offset_s_});
-  const auto gyro = has_depths() ? std::nullopt : fit_gyro(evidence_.frames, with_scale_of(given, imu_), with_lens_of(given, rig_), offset_s_);
+  const auto gyro =
+      has_depths() ? std::nullopt : fit_gyro(evidence_.frames, with_scale_of(given, imu_), with_lens_of(given, rig_), offset_s_);
   if (!gyro) return given;
   MotionStart start{rig_, rig_.time_offset_s, false, true};
   const double line_off_s = gyro->line_delay_s - rig_.times(0).line_delay_s;

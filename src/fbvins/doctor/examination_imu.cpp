@@ -120,7 +120,8 @@ void Examination::gyro_unit(const TurnFit& fit) {
   finding.advice = advice;
   imu_ = imu_.with_gyro(factor * Mat3::Identity());
   // The readings' noise was measured in the wrong unit.
-  if (std::erase_if(out_.findings, [](const Finding& f) { return f.kind == FindingKind::imu_noise && f.unit == kOfReadings; }) > 0)
+  if (std::erase_if(out_.findings, [](const Finding& f) { return f.kind == FindingKind::imu_noise && f.unit == kOfReadings; }) >
+      0)
     rig_.imu_noise = plausible(evidence_.rig.imu_noise);
 }
 

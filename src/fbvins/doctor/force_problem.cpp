@@ -216,9 +216,8 @@ double ForceProblem::error_of(const Window& window) const {
 
 double ForceProblem::capped_error() const {
   double sum = 0, count = 0;
-  for_each_error(windows_, {matrix(), Vec3(x.segment<3>(kBias)), p_BC_, focal_px_}, [&](double norm) {
-    sum += std::pow(std::min(norm, kCap_px), 2), ++count;
-  });
+  for_each_error(windows_, {matrix(), Vec3(x.segment<3>(kBias)), p_BC_, focal_px_},
+                 [&](double norm) { sum += std::pow(std::min(norm, kCap_px), 2), ++count; });
   return std::sqrt(sum / std::max(count, 1.0));
 }
 

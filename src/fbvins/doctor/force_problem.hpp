@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private to the doctor: tracks of one camera, without depths, as the motion by the IMU alone predicts them over windows of
 // one and a half seconds; a least-squares problem in what the accelerometer is wrong by. True specific force: M reading + c, with
-// M = diag(exp(common + axis)) + cross. Of each window the points, velocity, gravity, whose magnitude is known, and a small bias of
-// the gyroscope are eliminated. The method: docs/doctor.md.
+// M = diag(exp(common + axis)) + cross. Of each window the points, velocity, gravity, whose magnitude is known, and a small bias
+// of the gyroscope are eliminated. The method: docs/doctor.md.
 #pragma once
 
 #include <optional>
@@ -26,11 +26,11 @@ using Mat39 = Eigen::Matrix<double, 3, 9>;
 struct Sight {
   Vec3 ray_B = Vec3::Zero();  ///< of length 1
   double t_s = 0;
-  Mat3 R = Mat3::Identity();          ///< body to window
-  Mat39 p_matrix = Mat39::Zero();     ///< position, by each entry of M, row by row
-  Mat3 p_bias = Mat3::Zero();         ///< by c
-  Mat3 p_gyro = Mat3::Zero();         ///< by a bias of the gyroscope
-  Mat3 turn_gyro = Mat3::Zero();      ///< rotation vector in the window, likewise
+  Mat3 R = Mat3::Identity();       ///< body to window
+  Mat39 p_matrix = Mat39::Zero();  ///< position, by each entry of M, row by row
+  Mat3 p_bias = Mat3::Zero();      ///< by c
+  Mat3 p_gyro = Mat3::Zero();      ///< by a bias of the gyroscope
+  Mat3 turn_gyro = Mat3::Zero();   ///< rotation vector in the window, likewise
 };
 
 struct Track {

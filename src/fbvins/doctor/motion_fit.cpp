@@ -73,7 +73,8 @@ std::vector<FoundChange> search(MotionProblem& problem, const MotionStart& start
     const Amount amount = amount_of(*best->group, best->fit, best->solution);
     if (amount.sigmas() <= kSignificant) break;
     const bool said = !start.gyro_known || !of_gyro_fit(best->group->kind);
-    if (said && amount.value.norm() > best->group->practical) found.push_back({best->group, explained_px(capped, best->error_px)});
+    if (said && amount.value.norm() > best->group->practical)
+      found.push_back({best->group, explained_px(capped, best->error_px)});
     capped = best->error_px;
     problem = std::move(best->fit);
   }

@@ -36,12 +36,10 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
 
 namespace {
 
-constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3,
-                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2, 0.02, 0.02,
-                                                    0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02};
-constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4,
-                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5,
-                                              1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5};
+constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3,  0.3,  0.3,  0.3,  0.3,  0.3,  0.3,  0.1,  0.3,
+                                                    50,  50,  0.2, 0.2, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02};
+constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5,
+                                              1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5};
 
 constexpr int kIterations = 4;
 /// Of a step towards the end of a lens model's range.
@@ -109,8 +107,8 @@ std::optional<std::pair<Vec3, Vec3>> rays_in_b(const Hypothesis& h, const Predic
                    turn.around_b.back(late_b, ray_b->homogeneous().normalized()));
 }
 
-/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera. Without depths
-/// that across the epipolar line alone.
+/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera. Without
+/// depths that across the epipolar line alone.
 std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray_a,
                              const Vec3& p_ab) {
   const double height = h.camera.height();

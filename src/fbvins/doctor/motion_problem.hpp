@@ -2,8 +2,8 @@
 // Private to the doctor: errors of features predicted from image to image with the gyroscope's rotation, as a least-squares
 // problem in changes of the setup. The unknowns: rotation (R_CB Exp(x), rad), time offset (s), gyroscope's bias (rad/s) and
 // logarithm of its scale and of that of each axis, time from an image's first line to its last (s), and of the left lens
-// logarithm of the focal length, principal point (px), radial coefficients. And what the gyroscope reads of a specific force, rad/s
-// for each m/s^2.
+// logarithm of the focal length, principal point (px), radial coefficients. And what the gyroscope reads of a specific force,
+// rad/s for each m/s^2.
 #pragma once
 
 #include <optional>

@@ -73,7 +73,7 @@ RightMotion right_motion(Time t, const StereoRig& rig, const ImuSeries& imu, std
 }  // namespace
 
 std::vector<Match> collect(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
-                          std::span<const FramePair> pairs) {
+                           std::span<const FramePair> pairs) {
   std::vector<Match> matches;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const RightMotion motion = imu != nullptr ? right_motion(views[v].t, rig, *imu, pairs) : RightMotion{};

@@ -37,7 +37,7 @@ struct Match {
 
 /// The views' matches, each with the right camera's motion where `imu` and `pairs` give it.
 std::vector<Match> collect(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
-                          std::span<const FramePair> pairs);
+                           std::span<const FramePair> pairs);
 
 /// The rig changed by x, made once for all matches.
 struct Hypothesis {

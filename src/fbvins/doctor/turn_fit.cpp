@@ -82,7 +82,8 @@ std::vector<PairedFeature> in_both(const SeenFrame& a, const SeenFrame& b, bool 
   for (const SeenFeature& feature : a.features) {
     while (there != b.features.end() && there->id < feature.id) ++there;
     if (there == b.features.end()) break;
-    if (there->id == feature.id && (without_depths || feature.inverse_depth > 0)) both.push_back({feature.px, there->px, feature.inverse_depth});
+    if (there->id == feature.id && (without_depths || feature.inverse_depth > 0))
+      both.push_back({feature.px, there->px, feature.inverse_depth});
   }
   return both;
 }

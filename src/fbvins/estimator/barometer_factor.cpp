@@ -24,7 +24,9 @@ constexpr double kGust_m = 0.1;
 
 }  // namespace
 
-double pressure_height_m(double pressure_pa, double reference_pa) { return kScaleHeight_m * std::log(reference_pa / pressure_pa); }
+double pressure_height_m(double pressure_pa, double reference_pa) {
+  return kScaleHeight_m * std::log(reference_pa / pressure_pa);
+}
 
 double LevelDrift::residual(const WindowProblem& w) const {
   return (w.own_variable(after_).value(0) - w.own_variable(before_).value(0)) / sigma_m_;
@@ -78,7 +80,7 @@ void BarometerMaker::begin_level(const Height& height, double level_m, SlidingWi
 
 std::vector<std::shared_ptr<const Factor>> BarometerMaker::make(const NewFrame& f) {
   if (level_ && f.window.own(level_->number) == nullptr) level_.reset(), ended_.reset();  // a new window
-  if (ended_) f.window.end_own(*std::exchange(ended_, std::nullopt));  // the drift's factor names it by now
+  if (ended_) f.window.end_own(*std::exchange(ended_, std::nullopt));                     // the drift's factor names it by now
   const std::optional<Height> height = height_of(f);
   if (!height) return {};
   std::vector<std::shared_ptr<const Factor>> out;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A barometer: the pressure says how high the body is above a level that drifts, a variable of the window for every few seconds
-// (docs/barometer.md; docs/derivations/barometer.md, P1-P3). Readings that jump are left out, as when a door opens or the vehicle's
-// wind comes back from the ground; where the jump stays, a new level begins.
+// (docs/barometer.md; docs/derivations/barometer.md, P1-P3). Readings that jump are left out, as when a door opens or the
+// vehicle's wind comes back from the ground; where the jump stays, a new level begins.
 #pragma once
 
 #include <memory>
@@ -68,7 +68,7 @@ class BarometerMaker : public FactorMaker {
   double drift_m_rts_;
   std::optional<double> reference_pa_;
   std::optional<Level> level_;
-  std::optional<int> ended_;  ///< the level before, that the drift's factor names
+  std::optional<int> ended_;   ///< the level before, that the drift's factor names
   std::vector<Height> apart_;  ///< in a row, that do not fit, and fit to one another
   SensorDoubt doubt_{4};
 };

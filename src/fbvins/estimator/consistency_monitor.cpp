@@ -97,10 +97,13 @@ double ConsistencyMonitor::largest_drift() const {
   return largest;
 }
 
-void ConsistencyMonitor::take(const BiasEstimate& biases) { unrecoverable_ = tilt_.take(biases, contradicted_) || unrecoverable_; }
+void ConsistencyMonitor::take(const BiasEstimate& biases) {
+  unrecoverable_ = tilt_.take(biases, contradicted_) || unrecoverable_;
+}
 
-ConsistencyMonitor::Verdict ConsistencyMonitor::check(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
-                                const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
+ConsistencyMonitor::Verdict ConsistencyMonitor::check(const std::vector<LandmarkObservation>& observations,
+                                                      const Calibration& calibration, const Pose<G, B>& predicted, Duration dt,
+                                                      const Vec3& v_B) {
   Verdict out;
   if (observations.size() < kFewestToJudge) {
     blind(dt);
@@ -178,11 +181,13 @@ void ConsistencyMonitor::learn(const OfEachCamera& shift, double patience, Durat
   usual_shift_ += share * (std::min(largest, kLargestLearned) - usual_shift_);
 }
 
-/// What the noise of the readings and of two stamps and an uncertain velocity move all features by, in standard deviations of one.
+/// What the noise of the readings and of two stamps and an uncertain velocity move all features by, in standard deviations of
+/// one.
 double ConsistencyMonitor::spread(const Quat& predicted, const Vec3& v_B, double focal, Duration dt) const {
   const double s = std::max(1e-3, dt.seconds());
   const double ahead_m = std::max(kNearest_m, ahead_G_.norm());
-  const double by_stamps = std::sqrt(2.0) * expected_.stamp_s * (predicted.angularDistance(predicted_) / s + v_B.norm() / ahead_m);
+  const double by_stamps =
+      std::sqrt(2.0) * expected_.stamp_s * (predicted.angularDistance(predicted_) / s + v_B.norm() / ahead_m);
   const double by_noise = expected_.noise.gyro * assumed_.gyro_noise_density_radps_rthz * std::sqrt(s);
   return focal * std::hypot(by_stamps, by_noise, s * expected_.velocity_mps / ahead_m);
 }

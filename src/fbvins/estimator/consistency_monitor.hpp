@@ -3,8 +3,8 @@
 // the images alone give. Where they contradict each other, the rest decides who is right, and the wrong
 // one counts less, or not at all (docs/derivations/integrity.md). It decides what a measurement is worth; the window estimates.
 //
-//   const ConsistencyMonitor::Verdict verdict = monitor.check(landmark_observations(window, features, calibration), calibration, predicted,
-//   dt); if (verdict.imu_contradicts) use(*verdict.seen); covariance += monitor.doubt(T_GB);
+//   const ConsistencyMonitor::Verdict verdict = monitor.check(landmark_observations(window, features, calibration), calibration,
+//   predicted, dt); if (verdict.imu_contradicts) use(*verdict.seen); covariance += monitor.doubt(T_GB);
 //
 // One owner, one thread.
 #pragma once
@@ -100,11 +100,11 @@ class ConsistencyMonitor {
   bool calibrating_;
   Uncertainty expected_;
   double usual_shift_, learned_s_ = 0;  ///< of this rig's images, in standard deviations of a feature, and over which time
-  double excluded_s_ = 0;        ///< for how long one camera has been excluded for drift alone
-  OfEachCamera drift_ = none();  ///< of all that is seen, added up
-  double turned_sigma_ = 0;      ///< by which it may be
-  double lasting_s_ = 0;         ///< cumulative sum of what it is more than usual
-  double since_sudden_s_ = 1e9;  ///< since a drift that was a contradiction at once
+  double excluded_s_ = 0;               ///< for how long one camera has been excluded for drift alone
+  OfEachCamera drift_ = none();         ///< of all that is seen, added up
+  double turned_sigma_ = 0;             ///< by which it may be
+  double lasting_s_ = 0;                ///< cumulative sum of what it is more than usual
+  double since_sudden_s_ = 1e9;         ///< since a drift that was a contradiction at once
   Quat predicted_ = Quat::Identity();
   double evidence_ = 0;              ///< cumulative sum (CUSUM)
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare

@@ -147,7 +147,8 @@ TEST(ConsistencyMonitor, OfFourCamerasTheOneThatContradictsIsNamed) {
 TEST(ConsistencyMonitor, APairThatContradictsTheOtherPairIsLeftOut) {
   Scene scene;
   ConsistencyMonitor monitor(assumed(), false);
-  const ConsistencyMonitor::Verdict verdict = monitor.check(scene.seen_by_four(turned(0.02), turned(0.02)), scene.calibration, {}, kStep);
+  const ConsistencyMonitor::Verdict verdict =
+      monitor.check(scene.seen_by_four(turned(0.02), turned(0.02)), scene.calibration, {}, kStep);
   ASSERT_TRUE(verdict.wrong);
   EXPECT_TRUE(verdict.wrong->has(2) && verdict.wrong->has(3));
   EXPECT_FALSE(verdict.imu_contradicts);

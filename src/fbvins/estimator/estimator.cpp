@@ -243,8 +243,8 @@ std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame,
     return frame.features;
   }
   monitor_.expect({time_alignment_.stamp_sigma_s(), one_camera_ ? uncertainty_.velocity_sigma_mps() : 0, imu.noise});
-  const ConsistencyMonitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_), calibration_,
-                                                  predicted.state.T_FB, dt, predicted.state.v_B());
+  const ConsistencyMonitor::Verdict verdict = monitor_.check(landmark_observations(window_, frame.features, calibration_),
+                                                             calibration_, predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.noise.gyro > imu.noise.gyro || verdict.noise.accel > imu.noise.accel) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
     imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/estimator/propagated_state.hpp"
+#include "fbvins/estimator/consistency_monitor.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/factor_maker.hpp"
@@ -18,7 +18,7 @@
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/keyframe_policy.hpp"
-#include "fbvins/estimator/consistency_monitor.hpp"
+#include "fbvins/estimator/propagated_state.hpp"
 #include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"

@@ -22,7 +22,9 @@ class Exposures {
   explicit Exposures(const StereoRig& rig);
 
   /// Whether everything in the frame was seen at its stamp.
-  bool at_stamp(const TrackedFrame& frame) const { return !rolling_ && line_delay_correction_s_ == 0 && frame.offsets.all_zero(); }
+  bool at_stamp(const TrackedFrame& frame) const {
+    return !rolling_ && line_delay_correction_s_ == 0 && frame.offsets.all_zero();
+  }
   /// Of all cameras, in addition to the rig's.
   void correct_line_delay(double by_s) { line_delay_correction_s_ = by_s; }
   /// Turns the normalised positions into the axes that the cameras have at the stamp, and fills `rows`, `after_s` and `lever_B`;

@@ -46,7 +46,7 @@ struct Variable {
 /// A frame that is dropped and whose measurements its successor may take over.
 struct DroppedFrame {
   FrameId frame, successor;
-  Pose<B, B> T_successor_dropped;  ///< as estimated
+  Pose<B, B> T_successor_dropped;                                 ///< as estimated
   Vec3 v_dropped_B = Vec3::Zero(), v_successor_B = Vec3::Zero();  ///< likewise, each in its own axes
 };
 

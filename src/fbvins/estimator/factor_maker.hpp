@@ -38,7 +38,8 @@ class FactorMaker {
 class FactorMakers {
  public:
   /// `sensors`: of the program that uses the library.
-  FactorMakers(const StereoRig& rig, const EstimatorOptions& options, const std::vector<std::shared_ptr<OwnSensor>>& sensors = {});
+  FactorMakers(const StereoRig& rig, const EstimatorOptions& options,
+               const std::vector<std::shared_ptr<OwnSensor>>& sensors = {});
   std::vector<FrameFactor> make(const NewFrame& frame);
   /// Of the first sensor that is.
   HealthReason doubt() const;

@@ -17,7 +17,8 @@ FactorMakers::FactorMakers(const StereoRig& rig, const EstimatorOptions& options
   if (rig.depth) makers_.push_back(std::make_unique<SurfaceMaker>(rig));
   if (options.velocity.enabled) makers_.push_back(std::make_unique<VelocityMaker>(options.velocity.slip_mps, has_stereo(rig)));
   if (options.barometer.enabled) makers_.push_back(std::make_unique<BarometerMaker>(options.barometer.drift_m_rts));
-  if (options.rangefinder.enabled) makers_.push_back(std::make_unique<RangeMaker>(options.rangefinder.floor_sigma_m, has_stereo(rig)));
+  if (options.rangefinder.enabled)
+    makers_.push_back(std::make_unique<RangeMaker>(options.rangefinder.floor_sigma_m, has_stereo(rig)));
   for (const std::shared_ptr<OwnSensor>& sensor : sensors) makers_.push_back(std::make_unique<OwnSensorMaker>(sensor));
 }
 

@@ -36,7 +36,8 @@ inline FactorRows rows_of(const Factor& factor, const WindowProblem& window, con
   for (const Variable& v : factor.variables()) {
     const int begin = fbvins::row_of(window, at, v), size = window.size_of(v);
     for (int k = 0; k < size; ++k) out.rows.push_back(begin + k);
-    if (size > 0) out.blocks.push_back({std::string(kinds[static_cast<int>(v.kind)]) + " " + std::to_string(v.frame.value), size});
+    if (size > 0)
+      out.blocks.push_back({std::string(kinds[static_cast<int>(v.kind)]) + " " + std::to_string(v.frame.value), size});
   }
   return out;
 }

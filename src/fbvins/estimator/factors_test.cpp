@@ -24,7 +24,9 @@ struct Level : Factor {
     if (names_own) out.push_back(Variable::own_one(number));
     return out;
   }
-  double residual(const WindowProblem& w) const { return 10 * (w.frame(frame).state.T_FB.p.z() - w.own_variable(number).value(0)); }
+  double residual(const WindowProblem& w) const {
+    return 10 * (w.frame(frame).state.T_FB.p.z() - w.own_variable(number).value(0));
+  }
   double cost(const WindowProblem& w) const override { return 0.5 * residual(w) * residual(w); }
   double linearise(const WindowProblem& w, NormalEquations& out) const override {
     const int pose = row_of(w, out.layout, Variable::pose_of(frame)) + 2, own = row_of(w, out.layout, Variable::own_one(number));
@@ -67,7 +69,7 @@ TEST(Factors, TheTestFindsAWrongSlopeAndAVariableThatIsNotNamed) {
 TEST(Factors, AnOwnVariableStaysInThePriorWhileAFactorNamesItOrItIsWanted) {
   WindowProblem p = window_with_level();
   p.own[0].is_wanted = true;
-  for (const auto& [frame, number] : {std::pair{0, 7}, std::pair{3, 7}}) 
+  for (const auto& [frame, number] : {std::pair{0, 7}, std::pair{3, 7}})
     p.factors.push_back(std::make_shared<const Level>(FrameId{frame}, number));
   MarginalisationMemory memory;
   const WindowPrior first = marginalise_frame(p, 0, {}, memory).prior;

@@ -24,7 +24,7 @@ struct HealthEvidence {
   int broken_features = 0;           ///< that were left out
   int landmarks_in_view = 1;
   bool few_tracks = false;
-  double blind_m = 0;       ///< by which the position's standard deviation has grown since there were enough
+  double blind_m = 0;  ///< by which the position's standard deviation has grown since there were enough
   bool no_pair_sees = false;
   bool after_dark = false;  ///< and the velocity is being found again
 
@@ -42,8 +42,8 @@ struct HealthEvidence {
 
   // What contradicts it
   bool contradiction = false;
-  bool unrecoverable = false;           ///< and the estimate cannot recover from it
-  std::uint8_t wrong_cameras = 0;  ///< bits, as in Health; they contradict the others and the readings
+  bool unrecoverable = false;                        ///< and the estimate cannot recover from it
+  std::uint8_t wrong_cameras = 0;                    ///< bits, as in Health; they contradict the others and the readings
   HealthReason doubted_sensor = HealthReason::none;  ///< another one that contradicts them and is left out
   enum class Correction { none, pending, made } correction = Correction::none;  ///< made: at once, after trouble
 };

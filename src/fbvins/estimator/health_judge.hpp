@@ -28,7 +28,7 @@ class HealthJudge {
     int failed_solves = 0;
     int broken_features = 0;  ///< that were left out
     bool contradiction = false;
-    bool unrecoverable = false;           ///< and the estimate cannot recover from it
+    bool unrecoverable = false;      ///< and the estimate cannot recover from it
     std::uint8_t wrong_cameras = 0;  ///< bits, as in Health; they contradict the others and the readings
     bool after_gap = false;          ///< of the readings
     bool after_dark = false;         ///< and the velocity is being found again

@@ -57,7 +57,7 @@ double HeightFactor::linearise(const WindowProblem& w, NormalEquations& out) con
 
 std::shared_ptr<const Factor> HeightFactor::without(const DroppedFrame& d) const {
   return std::make_shared<const HeightFactor>(d.successor, level_, d.T_successor_dropped * point_B_,
-                                             std::hypot(sigma_m_, kHandedOn_m), above_m_);
+                                              std::hypot(sigma_m_, kHandedOn_m), above_m_);
 }
 
 }  // namespace fbvins

@@ -49,9 +49,8 @@ double ImuFactor::cost(const WindowProblem& w) const {
 double ImuFactor::linearise(const WindowProblem& w, NormalEquations& out) const {
   const int i = w.index_of(from_), j = w.index_of(to_);
   Mat15 J[2];
-  const Vec15 r =
-      weighted_imu_residual(w.frames[i].state, w.frames[j].state, w.linearisation_point(i), w.linearisation_point(j), *readings_,
-                            w.tilt.gravity_G(w.weights.gravity_mps2), &J[0], &J[1]);
+  const Vec15 r = weighted_imu_residual(w.frames[i].state, w.frames[j].state, w.linearisation_point(i), w.linearisation_point(j),
+                                        *readings_, w.tilt.gravity_G(w.weights.gravity_mps2), &J[0], &J[1]);
   const double dt = readings_->dt_s();  // the derivatives by gravity are those by p_j and v_j, scaled and negated (W15)
   const Eigen::Matrix<double, 15, 2> J_tilt = -(0.5 * dt * dt * J[1].middleCols<3>(nav::p) + dt * J[1].middleCols<3>(nav::v)) *
                                               w.tilt.gravity_jacobian(w.weights.gravity_mps2);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings between two neighbouring frames (docs/derivations/preintegration.md, P17-P24; window.md, W15). The window keeps them as Frame::imu, which
-// joins neighbours when a frame between them is dropped; the factor is made from that for each problem.
+// The readings between two neighbouring frames (docs/derivations/preintegration.md, P17-P24; window.md, W15). The window keeps
+// them as Frame::imu, which joins neighbours when a frame between them is dropped; the factor is made from that for each problem.
 #pragma once
 
 #include <memory>

@@ -126,8 +126,8 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.all().empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
-  const bool halved =
-      frame.has_left != frame.has_right && !broken && !frames_.all().empty() && (frame.t - frames_.all().back().t).seconds() < kLongestSkip_s;
+  const bool halved = frame.has_left != frame.has_right && !broken && !frames_.all().empty() &&
+                      (frame.t - frames_.all().back().t).seconds() < kLongestSkip_s;
   if (halved && usable_features(frame, at_rest) < kMinFeaturesAtRest) {
     skipped_ = joined(std::move(skipped_), frame.imu);
     readings_.push_back(frame.imu);
@@ -196,7 +196,8 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
     return std::nullopt;
   }
   rest.state.bias.accel_mps2 = biases.bias.accel_mps2;
-  InitialSolution start{{frames_.all().begin(), frames_.all().end()}, std::vector<NavState<G>>(frames_.all().size(), rest.state), true, {}};
+  InitialSolution start{
+      {frames_.all().begin(), frames_.all().end()}, std::vector<NavState<G>>(frames_.all().size(), rest.state), true, {}};
   leave_out_moving(start.frames);
   return start;
 }

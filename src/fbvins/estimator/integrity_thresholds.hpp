@@ -84,8 +84,8 @@ inline constexpr double kDoubtedTilt_rad = 1 * kDegree, kConfirmed_s = 1.5, kAcc
 inline constexpr double kJump_s = 2, kAccelJump_mps2 = 0.25, kGyroJump_radps = 0.005, kMoved_sigma = 5;
 /// At the beginning, when the first errors of the start are found, they do. Chosen.
 inline constexpr double kBegun_s = 2;
-/// Nor is it another one after a restart that this has caused: unless it was younger than the second figure, when a bad start (a wrong
-/// time offset, noisy stamps) is more likely than a fault. Chosen.
+/// Nor is it another one after a restart that this has caused: unless it was younger than the second figure, when a bad start (a
+/// wrong time offset, noisy stamps) is more likely than a fault. Chosen.
 inline constexpr double kRefutedRemembered_s = 30, kSettled_s = 5;
 
 // ---- Up, carried on by the gyroscope (I14a).

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measurements of sensors that others bring (include/fbvins/estimator/own_sensor.hpp) as factors, with derivatives by differences.
+// Measurements of sensors that others bring (include/fbvins/estimator/own_sensor.hpp) as factors, with derivatives by
+// differences.
 #pragma once
 
 #include <memory>

@@ -56,11 +56,12 @@ class PropagatedState {
 
   PropagatedGravity up_;
   PropagatedVelocity velocity_;
-  std::optional<PropagatedGravity::Difference> tilt_away_;  ///< of the window, from what was known before a restart or a contradiction
-  bool contradicted_before_ = false;                ///< images and readings, in the frame before
-  bool disputed_ = false;                           ///< the window before was
-  double unproven_s_ = 0;                           ///< so long images and readings have to agree in a new one
-  double step_s_ = 0;                               ///< of the newest frame
+  std::optional<PropagatedGravity::Difference>
+      tilt_away_;                     ///< of the window, from what was known before a restart or a contradiction
+  bool contradicted_before_ = false;  ///< images and readings, in the frame before
+  bool disputed_ = false;             ///< the window before was
+  double unproven_s_ = 0;             ///< so long images and readings have to agree in a new one
+  double step_s_ = 0;                 ///< of the newest frame
   Time now_;
   std::optional<Covariances> covariances_;  ///< of the newest state that had any
 };

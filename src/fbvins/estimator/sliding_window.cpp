@@ -83,9 +83,8 @@ void SlidingWindow::forget_unused_own() {
       return std::find(variables.begin(), variables.end(), Variable::own_one(v.number)) != variables.end();
     };
     return !v.is_wanted && std::find(prior_.own.begin(), prior_.own.end(), v.number) == prior_.own.end() &&
-           std::none_of(frames_.begin(), frames_.end(), [&](const Frame& frame) {
-             return std::any_of(frame.factors.begin(), frame.factors.end(), names_it);
-           });
+           std::none_of(frames_.begin(), frames_.end(),
+                        [&](const Frame& frame) { return std::any_of(frame.factors.begin(), frame.factors.end(), names_it); });
   });
 }
 
@@ -133,8 +132,7 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
 
 void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& out) const {
   out.frames.clear();
-  for (const Frame& f : frames_)
-    out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior});
+  for (const Frame& f : frames_) out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior});
   fill_factors(frames_, out.factors);
   out.own = own_;
   out.tilt = tilt_;
@@ -222,7 +220,8 @@ void SlidingWindow::take_over_factors(const Frame& leaving, Frame& next) {
                              next.state.v_B()};
   std::vector<FrameFactor> taken;
   for (const FrameFactor& f : leaving.factors)
-    if (auto left = f.factor->touches(leaving.id) ? f.factor->without(dropped) : f.factor) taken.push_back({f.order, std::move(left)});
+    if (auto left = f.factor->touches(leaving.id) ? f.factor->without(dropped) : f.factor)
+      taken.push_back({f.order, std::move(left)});
   next.factors.insert(next.factors.begin(), taken.begin(), taken.end());
   for (Frame& frame : frames_) {
     if (frame.id == leaving.id) continue;

@@ -66,7 +66,9 @@ VelocityAtFrame at_frame(const NewFrame& f, const VelocitySample& reading) {
   return out;
 }
 
-bool same_sensor(const VelocitySample& a, const VelocitySample& b) { return a.p_B == b.p_B && a.q_BS.coeffs() == b.q_BS.coeffs(); }
+bool same_sensor(const VelocitySample& a, const VelocitySample& b) {
+  return a.p_B == b.p_B && a.q_BS.coeffs() == b.q_BS.coeffs();
+}
 
 /// Of each sensor the mean. Its readings' errors have much in common: the mean is no better than one of them.
 std::vector<VelocityAtFrame> readings_at(const NewFrame& f) {

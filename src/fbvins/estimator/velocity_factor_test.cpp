@@ -72,11 +72,11 @@ class Drive {
     frame.state.T_FB.q = so3_exp(Vec3(0, 0, heading));
     frame.state.v_FB = frame.state.T_FB.q * Vec3(1, 0, 0);
     for (int k = 0; k <= 10; ++k)
-      tracked.imu.samples.push_back({frame.t - Duration::from_seconds(0.005 * (10 - k)), Vec3(0, 0, kRate), Vec3(0, kRate, 9.81)});
+      tracked.imu.samples.push_back(
+          {frame.t - Duration::from_seconds(0.005 * (10 - k)), Vec3(0, 0, kRate), Vec3(0, kRate, 9.81)});
     for (const double before_s : {0.04, 0.02, 0.0})
-      tracked.aiding.emplace_back(VelocitySample{.t = frame.t - Duration::from_seconds(before_s),
-                                                 .v_mps = reads(Vec3(1, 0.4 * kRate, 0)),
-                                                 .p_B = Vec3(0.4, 0, 0)});
+      tracked.aiding.emplace_back(VelocitySample{
+          .t = frame.t - Duration::from_seconds(before_s), .v_mps = reads(Vec3(1, 0.4 * kRate, 0)), .p_B = Vec3(0.4, 0, 0)});
     const std::vector<TrackedFeature> none;
     return maker_.make({tracked, none, frame, window_, calibration_});
   }

@@ -97,7 +97,8 @@ std::vector<int> rows_of(const WindowProblem& window, const WindowLayout& at, co
   };
   if (prior.with_tilt) add(at.tilt_row(), kTiltSize);
   if (prior.with_calibration) add(at.calibration_row(), kCalibrationSize);
-  for (const int number : prior.own) add(row_of(window, at, Variable::own_one(number)), window.size_of(Variable::own_one(number)));
+  for (const int number : prior.own)
+    add(row_of(window, at, Variable::own_one(number)), window.size_of(Variable::own_one(number)));
   for (const int frame : prior.frames)
     for (int k = 0; k < 15; ++k) rows.push_back(at.row_of(frame, k));
   return rows;

@@ -13,7 +13,8 @@
 namespace fbvins {
 
 /// Where each variable is in the dense system: 9 of each frame (v, bg, ba), 2 of the tilt if it is estimated, the factors' own,
-/// calibration if it is estimated, 6 of each frame (p, theta). Consecutive poses are adjacent, which makes long runs for the Schur kernel.
+/// calibration if it is estimated, 6 of each frame (p, theta). Consecutive poses are adjacent, which makes long runs for the
+/// Schur kernel.
 struct WindowLayout {
   int frames = 0;
   int tilt_size = 0;

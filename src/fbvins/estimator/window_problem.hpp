@@ -50,8 +50,8 @@ using Vec18 = Eigen::Matrix<double, kCalibrationSize, 1>;
 /// `calibration` minus `from`, as a perturbation of `from`.
 Vec18 calibration_displacement(const Calibration& calibration, const Calibration& from);
 
-/// A variable that factors bring along: it lives as long as one of them names it, or their maker wants it. A vector; what is not one is
-/// estimated as the difference from a value that its factors keep.
+/// A variable that factors bring along: it lives as long as one of them names it, or their maker wants it. A vector; what is not
+/// one is estimated as the difference from a value that its factors keep.
 struct OwnVariable {
   int number = -1;  ///< never used again
   std::string name;
@@ -65,7 +65,7 @@ struct WindowPrior {
   QuadraticPrior quadratic;
   std::vector<int> own = {};  ///< numbers, ascending
   int own_size = 0;           ///< of all of them
-  std::vector<int> frames;  ///< indices into WindowProblem::frames
+  std::vector<int> frames;    ///< indices into WindowProblem::frames
   bool with_tilt = false;
   bool with_calibration = false;
   Calibration calibration;  ///< linearisation point of the calibration
@@ -106,7 +106,8 @@ struct WindowProblem {
   Vec3 distance_to_prior(const WindowLandmark& landmark) const;
   /// Of one that it has.
   const OwnVariable& own_variable(int number) const;
-  /// How far the variables of a prior are from its origin. Zero for frames that were in no prior before: it begins at their state.
+  /// How far the variables of a prior are from its origin. Zero for frames that were in no prior before: it begins at their
+  /// state.
   Eigen::VectorXd displacement(const WindowPrior& from) const;
   /// How many numbers a step of the variable has; 0 where it is not estimated.
   int size_of(const Variable& variable) const;

@@ -67,8 +67,7 @@ void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step,
     l.z() = (l.z() + step.landmarks[i].z() + scale * l.z()) / (1 + scale);
     l.z() = std::max(l.z(), window.weights.min_inverse_depth_1pm);
   }
-  if (at.calibration_size > 0)
-    window.move({Variable::Kind::calibration}, d.segment<kCalibrationSize>(at.calibration_row()));
+  if (at.calibration_size > 0) window.move({Variable::Kind::calibration}, d.segment<kCalibrationSize>(at.calibration_row()));
   int row = at.own_row();
   for (OwnVariable& own : window.own) {
     own.value += d.segment(row, own.value.size());

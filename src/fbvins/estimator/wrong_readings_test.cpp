@@ -56,7 +56,8 @@ TEST(WrongReadings, AGyroscopeThatDriftsIsSeenBeforeItHasMovedThePoseFar) {
     EXPECT_LT(flown.error_m[k], 3 * std::sqrt(o.pose_covariance.topLeftCorner<3, 3>().trace())) << k;
   }
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
-  EXPECT_EQ(flown.odometry.back().reset_counter, flown.odometry[kFrom].reset_counter + 1) << "the pose has moved by an unknown amount";
+  EXPECT_EQ(flown.odometry.back().reset_counter, flown.odometry[kFrom].reset_counter + 1)
+      << "the pose has moved by an unknown amount";
 }
 
 /// A start may be as wrong as what ended the window before.

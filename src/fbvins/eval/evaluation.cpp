@@ -48,8 +48,8 @@ double gap_of(const std::vector<PosePair>& pairs) {
 
 /// How much of the estimate's time has truth.
 void cover(const AnyTrajectory& estimate, const std::vector<PosePair>& pairs, double gap_s, Evaluation& e) {
-  const auto [first, last] = std::minmax_element(estimate.poses.begin(), estimate.poses.end(),
-                                                 [](const auto& a, const auto& b) { return a.t < b.t; });
+  const auto [first, last] =
+      std::minmax_element(estimate.poses.begin(), estimate.poses.end(), [](const auto& a, const auto& b) { return a.t < b.t; });
   double missing_s = 0;
   Time before = first->t;
   const auto up_to = [&](Time t) {

@@ -52,7 +52,8 @@ Misreading find_misreading(const AnyTrajectory& truth, const AnyTrajectory& esti
   const Variant* best = nullptr;
   double best_deg = kExplained * as_read_deg;
   for (const Variant& variant : kVariants)
-    if (const double deg = off_deg(pairs, variant.meant); as_read_deg > kWrong_deg && deg < best_deg) best = &variant, best_deg = deg;
+    if (const double deg = off_deg(pairs, variant.meant); as_read_deg > kWrong_deg && deg < best_deg)
+      best = &variant, best_deg = deg;
   if (best) {
     for (auto& pose : out.estimate.poses) pose.T.q = best->meant(pose.T.q);
     out.said = best->said;

@@ -22,7 +22,8 @@ bool exists(const std::string& path) { return access(path.c_str(), R_OK) == 0; }
 
 std::string data_file(const std::string& name) {
   // In the Python package the programs lie in a folder beside the data.
-  for (const std::string& path : {own_folder() + "/data/" + name, own_folder() + "/../data/" + name, FBVINS_INSTALLED_DATA "/" + name})
+  for (const std::string& path :
+       {own_folder() + "/data/" + name, own_folder() + "/../data/" + name, FBVINS_INSTALLED_DATA "/" + name})
     if (exists(path)) return path;
   return FBVINS_SOURCE_DATA "/" + name;
 }

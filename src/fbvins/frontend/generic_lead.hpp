@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frontend of any kind as one that can lead a pair (track_transfer.hpp): it gives no tracks to another and takes none, but begins
-// anew. Synchronous; one instance is used by one thread at a time.
+// A frontend of any kind as one that can lead a pair (track_transfer.hpp): it gives no tracks to another and takes none, but
+// begins anew. Synchronous; one instance is used by one thread at a time.
 //
 //   GenericLead lead(rig, [](const StereoRig& r) { return std::make_unique<MyFrontend>(r); });
 #pragma once

@@ -11,12 +11,12 @@
 
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/epipolar_check.hpp"
-#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_options.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/motion_check.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/typical_depth.hpp"
 
 namespace fbvins {

@@ -14,7 +14,6 @@
 #include <memory>
 
 #include "fbvins/frontend/detection_policy.hpp"
-#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/orb_depth.hpp"
 #include "fbvins/frontend/orb_locator.hpp"
@@ -23,6 +22,7 @@
 #include "fbvins/frontend/orb_recogniser.hpp"
 #include "fbvins/frontend/orb_starter.hpp"
 #include "fbvins/frontend/orb_track_matcher.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 
 namespace fbvins {
 

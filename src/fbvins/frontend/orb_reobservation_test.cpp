@@ -6,8 +6,8 @@
 #include <map>
 
 #include "fbvins/frontend/orb_frontend.hpp"
-#include "tests/support/textured_wall.hpp"
 #include "tests/support/test_wall.hpp"
+#include "tests/support/textured_wall.hpp"
 
 namespace fbvins {
 namespace orb_reobservation_test {

@@ -48,8 +48,7 @@ void add(FrontendStats& sum, const FrontendStats& of_group) {
 
 }  // namespace
 
-RigFrontend::RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends,
-                         int max_features)
+RigFrontend::RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends, int max_features)
     : groups_(std::move(groups)), frontends_(std::move(frontends)), budget_(max_features, groups_.size()) {}
 
 TrackId RigFrontend::rig_wide(TrackId id, std::size_t group) const {

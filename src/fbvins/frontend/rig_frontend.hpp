@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "fbvins/camera/camera_groups.hpp"
-#include "fbvins/frontend/track_transfer.hpp"
 #include "fbvins/frontend/track_budget.hpp"
+#include "fbvins/frontend/track_transfer.hpp"
 
 namespace fbvins {
 

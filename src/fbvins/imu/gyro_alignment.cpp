@@ -14,13 +14,13 @@ constexpr double kMostApart_s = 0.3;
 constexpr std::size_t kMostTracks = 40, kFewestTracks = 12;
 constexpr Duration kMargin = Duration{static_cast<std::int64_t>(1e9 * GyroAlignment::kLargestOffset_s)} + GyroTurns::kMostSide;
 constexpr int kMostSteps = 10;
-/// Of a step after which tracks were compared anew: their weights follow the directions of parallax, which follow the unknowns, and
-/// full steps swing to and fro.
+/// Of a step after which tracks were compared anew: their weights follow the directions of parallax, which follow the unknowns,
+/// and full steps swing to and fro.
 constexpr double kShare = 0.6;
 /// Of a step, in standard deviations of the solution, that is not worth another.
 constexpr double kLeastStep_sigmas = 0.03;
-/// Tracks are compared anew with a turn that differs by more, in standard deviations of a track, and by more than the second without
-/// the parallax that was found before.
+/// Tracks are compared anew with a turn that differs by more, in standard deviations of a track, and by more than the second
+/// without the parallax that was found before.
 constexpr double kDiffers_sigmas = 0.25, kDiffersMuch_sigmas = 1;
 /// Offsets from which the search begins: closer together than a quarter of the fastest motion of a hand, 5 Hz.
 constexpr double kStarts_s[] = {0, -0.04, 0.04, -0.08, 0.08};
@@ -162,8 +162,9 @@ GyroAlignment::Turned GyroAlignment::turned(const Pair& pair, const Vec8& x) con
 /// By so many standard deviations of a track the tracks' directions differ from where they were compared.
 double GyroAlignment::difference_sigmas(const Pair& pair, const Compared& compared, const Turned& now) const {
   const Eigen::Vector4d error = now.error(compared.turn);
-  const double rows = middle_row_px_ * (std::abs(error(3)) * now.turn.around_b.rate.norm() +
-                                        std::abs(now.turn.line_delay_s) * (now.turn.around_b.rate - compared.turn.around_b.rate).norm());
+  const double rows =
+      middle_row_px_ * (std::abs(error(3)) * now.turn.around_b.rate.norm() +
+                        std::abs(now.turn.line_delay_s) * (now.turn.around_b.rate - compared.turn.around_b.rate).norm());
   return std::max(error.head<3>().norm(), rows) / pair.tracks.front().sigma;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the gyroscope and the directions of tracks say of one another, without depth, scale or a start: the camera's time offset,
-// the line delay of its shutter, the rotation of its mounting and the gyroscope's bias (docs/derivations/gyro_alignment.md, Y1-Y6).
+// the line delay of its shutter, the rotation of its mounting and the gyroscope's bias (docs/derivations/gyro_alignment.md,
+// Y1-Y6).
 //
 //   GyroAlignment alignment(rig.T_BC0.R(), {});
 //   alignment.add(frame);                                   // each tracked frame
@@ -24,10 +25,10 @@ namespace fbvins {
 
 /// Standard deviations before any measurement.
 struct GyroAlignmentPrior {
-  double gyro_bias_radps = 0.1;                         ///< as of an unknown IMU (initial_prior.cpp)
-  double time_offset_s = 0.05;                          ///< of what is given: cameras behind a driver's buffers are late by up to a tenth of a second
-  double line_delay_s = 40e-6;                          ///< the common sensors take 10 to 100 us a row
-  double rotation_rad = 0.02;                           ///< of a mounting by its drawing
+  double gyro_bias_radps = 0.1;  ///< as of an unknown IMU (initial_prior.cpp)
+  double time_offset_s = 0.05;   ///< of what is given: cameras behind a driver's buffers are late by up to a tenth of a second
+  double line_delay_s = 40e-6;   ///< the common sensors take 10 to 100 us a row
+  double rotation_rad = 0.02;    ///< of a mounting by its drawing
   std::optional<TimeOffsetEstimate> known_offset = {};  ///< instead, until it is contradicted
 };
 
@@ -60,7 +61,8 @@ class GyroAlignment {
   static constexpr std::size_t kMostPairs = 150;
 
   /// `line_delay_s`: the rig's; what is found is in addition to it.
-  GyroAlignment(const Mat3& R_BC, double middle_row_px, double line_delay_s, const GyroAlignmentPrior& prior, std::size_t most_pairs = kMostPairs)
+  GyroAlignment(const Mat3& R_BC, double middle_row_px, double line_delay_s, const GyroAlignmentPrior& prior,
+                std::size_t most_pairs = kMostPairs)
       : R_BC_(R_BC), middle_row_px_(middle_row_px), line_delay_s_(line_delay_s), prior_(prior), most_pairs_(most_pairs) {}
 
   /// A frame with the readings since the one before. `given`: the rig's time offset; the segment says with which it was cut.

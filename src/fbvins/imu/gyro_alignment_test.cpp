@@ -103,7 +103,8 @@ TEST(GyroAlignment, PairsThatDoNotFitCountForLittle) {
   for (TrackedFrame& frame : hand.frames(6)) {
     const double t = (frame.t - Time{}).seconds() - 10;
     if (t > 2 && t < 4)
-      for (TrackedFeature& f : frame.features) f.left->normalised += Vec2(0.3 * (t - 2), 0) + 0.01 * Vec2(rng.normal(), rng.normal());
+      for (TrackedFeature& f : frame.features)
+        f.left->normalised += Vec2(0.3 * (t - 2), 0) + 0.01 * Vec2(rng.normal(), rng.normal());
     alignment.add(frame, {});
   }
   const auto estimate = alignment.solve();

@@ -42,8 +42,8 @@ TEST(GyroTurns, AParabolaWhereTheRateChanges) {
 TEST(GyroTurns, AnOffsetThatIsCorrectedLosesNothing) {
   GyroTurns turns;
   turns.add(segment(0, 0.1));
-  turns.add(ImuSegment{});          // corrected downwards: up to a moment that was before
-  turns.add(segment(0.07, 0.2));    // and again a part of what is known
+  turns.add(ImuSegment{});        // corrected downwards: up to a moment that was before
+  turns.add(segment(0.07, 0.2));  // and again a part of what is known
   EXPECT_TRUE(turns.covers(at(0.02), at(0.18)));
   EXPECT_LT((so3_log(turns.between(at(0.02), at(0.18))) - 0.16 * kRate).norm(), 1e-6);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings of an IMU: judged as they come, corrected by the calibration of its axes (ImuNoise::axes), kept once, on the images'
-// clock. Cuts them into segments between two times, interpolates, and says what is missing.
+// The readings of an IMU: judged as they come, corrected by the calibration of its axes (ImuNoise::axes), kept once, on the
+// images' clock. Cuts them into segments between two times, interpolates, and says what is missing.
 //
 //   ImuHistory history(rig.imu_noise, Duration::from_seconds(rig.time_offset_s));
 //   history.add(sample);                                        // from the driver or the dataset, on the IMU's clock
@@ -43,8 +43,8 @@ class ImuHistory {
 
   /// The readings in (from, to) with both ends interpolated. An end whose neighbours are far apart, or that has only one
   /// neighbour, holds the nearest value, and longest_gap says how far the readings touching [from, to] are apart, or how long
-  /// ago the last one was. Of an IMU that has never shown more than 50 readings a second a step of its own is no gap: it counts as
-  /// 50 ms at most, and ends are interpolated in it. Empty where the readings are missing, or unless from < to.
+  /// ago the last one was. Of an IMU that has never shown more than 50 readings a second a step of its own is no gap: it counts
+  /// as 50 ms at most, and ends are interpolated in it. Empty where the readings are missing, or unless from < to.
   ImuSegment between(Time from, Time to) const;
 
   /// Drops the readings that no segment from `t` on needs.

@@ -142,7 +142,8 @@ TEST(ImuHistory, CorrectsTheAxesOnceAndJudgesWhatTheSensorRead) {
   ImuHistory history(imu);
   EXPECT_TRUE(history.add({ms(0), Vec3(0.1, 0, 0), Vec3(0, 0, 19)}));
   EXPECT_DOUBLE_EQ(history.newest().accel_mps2.z(), 15.2);
-  EXPECT_FALSE(history.add({ms(5), Vec3(0.1, 0, 0), Vec3(0, 0, 21)})) << "beyond the range of the reading, if not of what it means";
+  EXPECT_FALSE(history.add({ms(5), Vec3(0.1, 0, 0), Vec3(0, 0, 21)}))
+      << "beyond the range of the reading, if not of what it means";
 }
 
 }  // namespace imu_history_test

@@ -33,11 +33,11 @@ struct RepropagationThreshold {
 
 /// What is assumed of the signal where readings are missing (eq. P13).
 struct ImuGapModel {
-  double longest_regular_step = 2.5;  ///< in sampling periods; a longer step is a gap
+  double longest_regular_step = 2.5;   ///< in sampling periods; a longer step is a gap
   double longest_known_step_s = 0.03;  ///< so is this one of a slow IMU: what lies between its readings is not known
-  double gyro_sigma_radps = 0.3;      ///< error of the mean rate over a long gap
-  double accel_sigma_mps2 = 2.0;      ///< error of the mean specific force over a long gap
-  double long_gap_s = 0.1;            ///< shorter gaps: sigmas scaled by (gap / long_gap)^2
+  double gyro_sigma_radps = 0.3;       ///< error of the mean rate over a long gap
+  double accel_sigma_mps2 = 2.0;       ///< error of the mean specific force over a long gap
+  double long_gap_s = 0.1;             ///< shorter gaps: sigmas scaled by (gap / long_gap)^2
 };
 
 class Preintegration {
@@ -48,8 +48,8 @@ class Preintegration {
   /// adds nothing; over a gap (ImuGapModel) the signal is taken as linear and the covariance inflated.
   void integrate(const ImuSegment& segment);
 
-  /// The interval may end earlier or later, by this standard deviation in seconds: the stamp of an image there has noise (eq. P11a).
-  /// `j`: the state at its end, with the gravity of its frame.
+  /// The interval may end earlier or later, by this standard deviation in seconds: the stamp of an image there has noise (eq.
+  /// P11a). `j`: the state at its end, with the gravity of its frame.
   template <class F>
   void loosen_end(double sigma_s, const NavState<F>& j, const Vec3& gravity_F) {
     loosen_end(sigma_s, j.v_B(), j.T_FB.q.conjugate() * gravity_F);
@@ -128,7 +128,7 @@ class Preintegration {
   std::vector<Reading> readings_;
   ImuDeltas deltas_;
   Mat3 J_theta_bg_, J_v_bg_, J_v_ba_, J_p_bg_, J_p_ba_;
-  Mat15 covariance_;  ///< without the end's
+  Mat15 covariance_;                                                             ///< without the end's
   Vec3 end_p_ = Vec3::Zero(), end_theta_ = Vec3::Zero(), end_v_ = Vec3::Zero();  ///< loosen_end()'s standard deviation, in B_j
   double longest_gap_s_ = 0;
   mutable Mat15 sqrt_information_;

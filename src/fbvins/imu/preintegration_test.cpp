@@ -210,8 +210,7 @@ TEST(Preintegration, ASlowImuKnowsLessThanItsNoiseSays) {
     ImuNoise noise;
     noise.rate_hz = declared_hz;
     ImuSegment segment;
-    for (int t = 0; t <= 1000; t += step_ms)
-      segment.samples.push_back({Time{t * 1'000'000LL}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+    for (int t = 0; t <= 1000; t += step_ms) segment.samples.push_back({Time{t * 1'000'000LL}, Vec3::Zero(), Vec3(0, 0, 9.81)});
     segment.longest_gap = Duration{step_ms * 1'000'000LL};
     Preintegration whole(noise, {});
     whole.integrate(segment);

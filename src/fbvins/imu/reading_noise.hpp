@@ -53,7 +53,7 @@ class ReadingNoise {
   bool gyro_clipped_ = false, accel_clipped_ = false;
   int clipped_before_ = 0;  ///< segments for which that of an earlier one counts
   double gyro_radps_ = 0, accel_mps2_ = 0;
-  double largest_gyro_radps_ = 0;  ///< so far, of an axis
+  double largest_gyro_radps_ = 0;                       ///< so far, of an axis
   double worst_gyro_radps_ = 0, worst_accel_mps2_ = 0;  ///< single readings of the segment
 };
 

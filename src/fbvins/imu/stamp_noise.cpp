@@ -18,8 +18,8 @@ constexpr double kSurely = 2.3;
 }  // namespace
 
 /// A pair shows the noise of its two stamps, and so does the pair that begins where it ends, of the stamp between them
-/// with the other sign: the difference has six times the variance of one. What lasts longer than a pair, as a gyroscope that drifts,
-/// is in neither. The median hides single images that are late.
+/// with the other sign: the difference has six times the variance of one. What lasts longer than a pair, as a gyroscope that
+/// drifts, is in neither. The median hides single images that are late.
 double stamp_sigma_s(const std::vector<LateImage>& late) {
   std::vector<double> difference_s, known_s2;
   auto before = late.begin();
@@ -35,7 +35,8 @@ double stamp_sigma_s(const std::vector<LateImage>& late) {
   return std::sqrt(std::max(0.0, surely * sigma * sigma - usual * usual - median(known_s2)) / 6);
 }
 
-void add_stamp_noise(ImuSegment& imu, const ImuNoise& noise, double stamp_sigma_s, const Vec3& rate_radps, const Vec3& velocity_mps) {
+void add_stamp_noise(ImuSegment& imu, const ImuNoise& noise, double stamp_sigma_s, const Vec3& rate_radps,
+                     const Vec3& velocity_mps) {
   const double sigma_s = std::sqrt(2.0) * stamp_sigma_s;
   if (imu.empty() || sigma_s == 0) return;
   const double dt = (imu.samples.back().t - imu.samples.front().t).seconds();

@@ -22,8 +22,9 @@ double stamp_sigma_s(const std::vector<LateImage>& late);
 /// Noise of stamps up to this does not show where tracks are few.
 inline constexpr double kUnseenStampNoise_s = 0.0007;
 
-/// Between two images whose stamps have this standard deviation the readings turn and move by as much more or less (Y8). `rate`: of
-/// the body, without bias; `velocity` in any frame.
-void add_stamp_noise(ImuSegment& imu, const ImuNoise& noise, double stamp_sigma_s, const Vec3& rate_radps, const Vec3& velocity_mps);
+/// Between two images whose stamps have this standard deviation the readings turn and move by as much more or less (Y8). `rate`:
+/// of the body, without bias; `velocity` in any frame.
+void add_stamp_noise(ImuSegment& imu, const ImuNoise& noise, double stamp_sigma_s, const Vec3& rate_radps,
+                     const Vec3& velocity_mps);
 
 }  // namespace fbvins

@@ -12,8 +12,8 @@ namespace fbvins {
 namespace {
 
 constexpr double kHuber_sigmas = 2;
-/// What is assumed of parallax: that of each track differs from the mean by so many times the mean, which is more than in any room, so that
-/// the mean counts only where parallax is small; none is larger than the second, rad.
+/// What is assumed of parallax: that of each track differs from the mean by so many times the mean, which is more than in any
+/// room, so that the mean counts only where parallax is small; none is larger than the second, rad.
 constexpr double kDepths = 3, kMostParallax = 0.5;
 /// Rows that are taken later have another parallax where the camera accelerates: by 3 m/s^2 at 3 m, standard deviation, 1/s^2.
 constexpr double kParallaxGain = 1;
@@ -43,14 +43,16 @@ Sight sight_of(const SeenTwice& track, const PredictedTurnOfPair& turn) {
   s.expected = turn.R.transpose() * a;
   const auto across = [&](const Vec3& v) { return Vec3(v - s.expected * s.expected.dot(v)); };
   s.off = across(b);
-  s.by_line = across(track.rows_b * turn.around_b.rate.cross(b) - turn.R.transpose() * (track.rows_a * turn.around_a.rate.cross(a)));
+  s.by_line =
+      across(track.rows_b * turn.around_b.rate.cross(b) - turn.R.transpose() * (track.rows_a * turn.around_a.rate.cross(a)));
   s.late_s = 0.5 * turn.line_delay_s * (track.rows_a + track.rows_b);
   s.normal = s.expected.cross(b);
   s.variance = track.sigma * track.sigma;
   return s;
 }
 
-/// The covariance of a sight is that of a track, and kDepths times its shift along the shift: C^-1 = (I - along shift shift^T) / variance.
+/// The covariance of a sight is that of a track, and kDepths times its shift along the shift: C^-1 = (I - along shift shift^T) /
+/// variance.
 struct Weighted {
   Vec3 shift, residual;
   double along, information;  ///< with the robust weight
@@ -101,8 +103,8 @@ double unlikeliness(const std::vector<Sight>& sights, const Vec3& parallax) {
   return out;
 }
 
-/// Where parallax is large, its direction lies in the plane of both directions of every track: the least share of what noise would
-/// spread the planes' normals by, and not the least spread, which is always along the view.
+/// Where parallax is large, its direction lies in the plane of both directions of every track: the least share of what noise
+/// would spread the planes' normals by, and not the least spread, which is always along the view.
 Vec3 by_planes(const std::vector<Sight>& sights) {
   Mat3 spread = Mat3::Zero(), by_noise = 1e-6 * Mat3::Identity();
   for (const Sight& s : sights) {
@@ -121,7 +123,8 @@ Vec3 by_planes(const std::vector<Sight>& sights) {
 }
 
 Vec3 best_parallax(const std::vector<Sight>& sights) {
-  const Vec3 from_none = fit_parallax(sights, Vec3::Zero(), kRounds), from_planes = fit_parallax(sights, by_planes(sights), kRounds);
+  const Vec3 from_none = fit_parallax(sights, Vec3::Zero(), kRounds),
+             from_planes = fit_parallax(sights, by_planes(sights), kRounds);
   if ((from_none - from_planes).norm() < kSame_rad) return from_none;
   return unlikeliness(sights, from_planes) < unlikeliness(sights, from_none) ? from_planes : from_none;
 }

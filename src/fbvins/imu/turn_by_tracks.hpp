@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tracks of two images say of a turn that the gyroscope's readings predict, without depth or scale: by how much it and the
-// line delay of the shutter are off (docs/derivations/gyro_alignment.md, Y1-Y4). Pure functions, any thread.
+// What the tracks of two images say of a turn that the gyroscope's readings predict, without depth or scale: by how much it and
+// the line delay of the shutter are off (docs/derivations/gyro_alignment.md, Y1-Y4). Pure functions, any thread.
 //
 //   TurnError error = turn_error(tracks, predicted, {});
 //   const Vec4 off = -error.A.ldlt().solve(error.a);         // (rad, rad, rad, s), R exp(off) fits best

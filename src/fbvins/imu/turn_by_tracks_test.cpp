@@ -30,12 +30,13 @@ struct Scene {
       const Vec3 noise(rng.normal(), rng.normal(), rng.normal());
       const Vec3 b = (truth.R.transpose() * a - moved / rng.uniform(2, 6) + kSigma * noise).normalized();
       const double rows_a = 450 * a.y() / a.z(), rows_b = 450 * b.y() / b.z();
-      tracks.push_back({so3_exp(-truth.around_a.after(kLineDelay_s * rows_a)) * a, so3_exp(-truth.around_b.after(kLineDelay_s * rows_b)) * b,
-                        kSigma, rows_a, rows_b});
+      tracks.push_back({so3_exp(-truth.around_a.after(kLineDelay_s * rows_a)) * a,
+                        so3_exp(-truth.around_b.after(kLineDelay_s * rows_b)) * b, kSigma, rows_a, rows_b});
     }
   }
   PredictedTurnOfPair off_by(const Vec3& turn, double line_delay_s) const {
-    return {truth.R * so3_exp(turn).toRotationMatrix(), truth.around_a, truth.around_b, truth.line_delay_s + line_delay_s, truth.dt_s};
+    return {truth.R * so3_exp(turn).toRotationMatrix(), truth.around_a, truth.around_b, truth.line_delay_s + line_delay_s,
+            truth.dt_s};
   }
 };
 

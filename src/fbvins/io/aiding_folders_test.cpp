@@ -26,7 +26,8 @@ VelocitySample wheel() {
 Result<std::vector<AidingSample>> parsed(const std::string& kind, const std::string& yaml, const std::string& csv,
                                          std::vector<std::string>& warnings, const Pose<B, B>& T_BI = {}) {
   for (const AidingFolder& folder : aiding_folders())
-    if (folder.name == kind) return folder.parse({YamlReader(kind + "0/sensor.yaml", yaml), csv, kind + "0/data.csv", T_BI}, warnings);
+    if (folder.name == kind)
+      return folder.parse({YamlReader(kind + "0/sensor.yaml", yaml), csv, kind + "0/data.csv", T_BI}, warnings);
   return Error{ErrorCode::not_found, kind};
 }
 
@@ -113,14 +114,13 @@ TEST(AidingFolders, WrongFilesAreNamed) {
     const char *kind, *says;
     std::string yaml, csv;
   };
-  for (const Case& c : {Case{"range", "T_BS", "noise_m: 0.01\n", text.csv}, Case{"range", "noise_m", negative, text.csv},
-                        Case{"range", "data.csv:1", text.sensor_yaml, "1,2,3\n"},
-                        Case{"velocity", "T_BS", "noise_mps: [1, 1, 1]\n", "1,2,3,4\n"},
-                        Case{"velocity", "noise_mps", text.sensor_yaml + "noise_mps: [0.1, 0, 0.1]\n", "1,2,3,4\n"},
-                        Case{"velocity", "noise_mps", text.sensor_yaml + "noise_mps: [0.1]\n", "1,2,3,4\n"},
-                        Case{"velocity", "4 or 7", text.sensor_yaml, "1,2,3\n"},
-                        Case{"baro", "noise_pa", "noise_pa: 0\n", "1,100000\n"},
-                        Case{"baro", "data.csv:1", "noise_pa: 1\n", "1,2,3\n"}}) {
+  for (const Case& c :
+       {Case{"range", "T_BS", "noise_m: 0.01\n", text.csv}, Case{"range", "noise_m", negative, text.csv},
+        Case{"range", "data.csv:1", text.sensor_yaml, "1,2,3\n"}, Case{"velocity", "T_BS", "noise_mps: [1, 1, 1]\n", "1,2,3,4\n"},
+        Case{"velocity", "noise_mps", text.sensor_yaml + "noise_mps: [0.1, 0, 0.1]\n", "1,2,3,4\n"},
+        Case{"velocity", "noise_mps", text.sensor_yaml + "noise_mps: [0.1]\n", "1,2,3,4\n"},
+        Case{"velocity", "4 or 7", text.sensor_yaml, "1,2,3\n"}, Case{"baro", "noise_pa", "noise_pa: 0\n", "1,100000\n"},
+        Case{"baro", "data.csv:1", "noise_pa: 1\n", "1,2,3\n"}}) {
     std::vector<std::string> warnings;
     const auto read = parsed(c.kind, c.yaml, c.csv, warnings);
     ASSERT_FALSE(read) << c.kind << " " << c.says;

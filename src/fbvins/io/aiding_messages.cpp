@@ -23,7 +23,9 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 /// Where a message says nothing: of zero, ROS's word for unknown.
 constexpr double kUnknownTwist_mps = 0.1;
 
-double sigma_of(double variance, double otherwise) { return variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : otherwise; }
+double sigma_of(double variance, double otherwise) {
+  return variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : otherwise;
+}
 
 /// Beyond its limits, or infinite where it sees nothing (REP 117).
 RangeSample range_of(MessageFields& in, Encoding encoding) {
@@ -147,7 +149,9 @@ std::optional<Pose<B, B>> mounting_of(const AidingSample& reading) {
   return std::visit(Overloaded{[](const RangeSample& r) -> Place {
                                  return Pose<B, B>{Quat::FromTwoVectors(Vec3::UnitX(), r.direction_B), r.p_B};
                                },
-                               [](const VelocitySample& r) -> Place { return Pose<B, B>{r.q_BS, r.p_B}; },
+                               [](const VelocitySample& r) -> Place {
+                                 return Pose<B, B>{r.q_BS, r.p_B};
+                               },
                                [](const PressureSample&) -> Place { return std::nullopt; }},
                     reading);
 }
@@ -184,8 +188,7 @@ bool is_own_aiding_topic(std::string_view topic) {
 AidingSensors::Sensor* AidingSensors::find(const AidingSample& reading) {
   const auto T_BS = mounting_of(reading);
   const auto same = [&](const Sensor& s) {
-    return s.type == aiding_type(reading) &&
-           (!T_BS || (s.T_BS->p == T_BS->p && s.T_BS->q.coeffs() == T_BS->q.coeffs()));
+    return s.type == aiding_type(reading) && (!T_BS || (s.T_BS->p == T_BS->p && s.T_BS->q.coeffs() == T_BS->q.coeffs()));
   };
   const auto at = std::ranges::find_if(all_, same);
   return at == all_.end() ? nullptr : &*at;

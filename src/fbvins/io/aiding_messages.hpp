@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private: readings of aiding sensors as ROS's messages, sensor_msgs/Range, geometry_msgs/TwistWithCovarianceStamped and
-// sensor_msgs/FluidPressure, in both encodings, and back. Where the sensor sits is no part of them, but the pose of the frame that
-// they name. Pure functions, any thread.
+// sensor_msgs/FluidPressure, in both encodings, and back. Where the sensor sits is no part of them, but the pose of the frame
+// that they name. Pure functions, any thread.
 //
 //   std::optional<AidingMessage> message = aiding_of(bytes, Encoding::cdr, "sensor_msgs/Range");
 //   AidingSample reading = mounted(message->reading, T_BS);

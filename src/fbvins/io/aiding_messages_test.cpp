@@ -49,7 +49,8 @@ TEST(AidingMessages, UnknownVariancesAreTheDefaults) {
   VelocitySample v{.t = kT};
   v.sigma_mps.setZero();
   EXPECT_EQ(std::get<VelocitySample>(back(v, Encoding::ros1)->reading).sigma_mps, Vec3::Constant(0.1));
-  EXPECT_EQ(std::get<PressureSample>(back(PressureSample{kT, 1e5, 0}, Encoding::cdr)->reading).sigma_pa, PressureSample{}.sigma_pa);
+  EXPECT_EQ(std::get<PressureSample>(back(PressureSample{kT, 1e5, 0}, Encoding::cdr)->reading).sigma_pa,
+            PressureSample{}.sigma_pa);
 }
 
 TEST(AidingMessages, ASensorThatSeesNothingIsRead) {

@@ -111,7 +111,8 @@ TEST(Csv, AWrappedCounterIsContinued) {
   EXPECT_EQ(continue_wrapped(stamps), 1);
   EXPECT_EQ(stamps[2], Time{wrap});
   EXPECT_EQ(stamps[3], Time{wrap + 50 * ms});
-  std::vector<Time> set_back = {Time{wrap}, Time{wrap + 50 * ms}, Time{wrap - 1000 * ms}, Time{wrap - 950 * ms}}, before = set_back;
+  std::vector<Time> set_back = {Time{wrap}, Time{wrap + 50 * ms}, Time{wrap - 1000 * ms}, Time{wrap - 950 * ms}},
+                    before = set_back;
   EXPECT_EQ(continue_wrapped(set_back), 0) << "a clock that is set back is no counter that wraps";
   EXPECT_EQ(set_back, before);
   std::vector<Time> damaged = {Time{wrap}, Time{wrap + 50 * ms}, Time{70 * ms}, Time{wrap + 150 * ms}};

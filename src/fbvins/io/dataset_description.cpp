@@ -41,8 +41,9 @@ void warn_about_rate(double measured_hz, double declared_hz, std::vector<std::st
   const bool other = declared_hz > kOtherRate * measured_hz;
   warnings.push_back(fmt::format("IMU: {:.3g} readings a second{}, {}: set the sensor to 100 to 400 Hz", measured_hz,
                                  other ? fmt::format(" where {:.3g} are declared", declared_hz) : "",
-                                 measured_hz < kTooFew_hz ? "too few for an estimate (`imu_gap`, `alignment_refused`)"
-                                                          : "between which the motion is hardly known, so that the covariance is larger"));
+                                 measured_hz < kTooFew_hz
+                                     ? "too few for an estimate (`imu_gap`, `alignment_refused`)"
+                                     : "between which the motion is hardly known, so that the covariance is larger"));
 }
 
 void describe_imu(const std::vector<ImuSample>& imu, double declared_hz, DatasetInfo& info) {
@@ -65,9 +66,10 @@ void describe_imu(const std::vector<ImuSample>& imu, double declared_hz, Dataset
 void describe_aiding(const std::vector<AidingSample>& readings, DatasetInfo& info) {
   std::map<std::string, std::vector<Time>> stamps;
   for (const AidingSample& reading : readings) {
-    const char* name = std::visit(Overloaded{[](const RangeSample&) { return "rangefinder"; }, [](const VelocitySample&) { return "velocity"; },
-                                             [](const PressureSample&) { return "barometer"; }},
-                                  reading);
+    const char* name =
+        std::visit(Overloaded{[](const RangeSample&) { return "rangefinder"; }, [](const VelocitySample&) { return "velocity"; },
+                              [](const PressureSample&) { return "barometer"; }},
+                   reading);
     stamps[name].push_back(stamp_of(reading));
   }
   for (const auto& [name, times] : stamps) {

@@ -112,9 +112,10 @@ TEST(DatasetTest, AnImuThatIsTooSlowIsSaid) {
       said(8, 200),
       "IMU: 8 readings a second where 200 are declared, too few for an estimate (`imu_gap`, `alignment_refused`): set the sensor "
       "to 100 to 400 Hz");
-  EXPECT_EQ(said(20, 20),
-            "IMU: 20 readings a second, between which the motion is hardly known, so that the covariance is larger: set the sensor to "
-            "100 to 400 Hz");
+  EXPECT_EQ(
+      said(20, 20),
+      "IMU: 20 readings a second, between which the motion is hardly known, so that the covariance is larger: set the sensor to "
+      "100 to 400 Hz");
   EXPECT_EQ(said(100, 200), "");
 }
 

@@ -300,7 +300,8 @@ class EurocReader {
       }
     std::ranges::stable_sort(out_.aiding, {}, [](const AidingSample& r) { return stamp_of(r); });
     const Time first = out_.frames.front().t + Duration::from_seconds(out_.rig.time_offset_s);
-    if (begins_later(options_)) std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < first - kImuLeadIn; });
+    if (begins_later(options_))
+      std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < first - kImuLeadIn; });
     return {};
   }
 
@@ -360,7 +361,7 @@ class EurocReader {
   bool has_depth_ = false;    ///< images of a depth sensor, which are used
   bool has_imu_ = false;
   EurocRows rows_;
-  Pose<B, B> T_BI_;           ///< takes IMU to the recording's body coordinates
+  Pose<B, B> T_BI_;  ///< takes IMU to the recording's body coordinates
   DatasetContents out_;
 };
 

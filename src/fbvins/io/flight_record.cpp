@@ -168,7 +168,8 @@ Result<void> FlightRecord::add(const AidingSample& of_images) {
     sensor->topic = *topic;
     write_calibration(t);
   }
-  write(sensor->topic, t, [&](std::string& out) { out += aiding_message(reading, sensor->T_BS ? sensor->name : kBodyFrame, Encoding::cdr); });
+  write(sensor->topic, t,
+        [&](std::string& out) { out += aiding_message(reading, sensor->T_BS ? sensor->name : kBodyFrame, Encoding::cdr); });
   return flush_if_large();
 }
 

@@ -6,7 +6,8 @@
 //   Result<void> taken = record->add(sample);    // in memory until it is a megabyte, or flush()
 //   Result<void> done = record->finish();
 //
-// IMU readings, frames and aiding sensors' readings must come in the order in which the estimator takes them: in that order they are read back.
+// IMU readings, frames and aiding sensors' readings must come in the order in which the estimator takes them: in that order they
+// are read back.
 #pragma once
 
 #include <string>

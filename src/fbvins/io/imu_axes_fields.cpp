@@ -44,10 +44,12 @@ void check(YamlReader& yaml, const YAML::Node& map, const char* field, const Imu
 }
 
 /// What a sensor reads that is corrected as M reading - b; complains where M has no inverse.
-void set_reading(YamlReader& yaml, const YAML::Node& map, const char* field, const Mat3& M, const Vec3& b, Mat3& matrix, Vec3& bias) {
+void set_reading(YamlReader& yaml, const YAML::Node& map, const char* field, const Mat3& M, const Vec3& b, Mat3& matrix,
+                 Vec3& bias) {
   constexpr double kNoInverse = 1e-3;
   if (!yaml.ok()) return;
-  if (!M.allFinite() || !(std::abs(M.determinant()) > kNoInverse)) return yaml.complain(map, field, "is a matrix without an inverse");
+  if (!M.allFinite() || !(std::abs(M.determinant()) > kNoInverse))
+    return yaml.complain(map, field, "is a matrix without an inverse");
   matrix = M.inverse();
   bias = matrix * b;
 }
@@ -107,9 +109,10 @@ ImuIntrinsics read_imu_axes(YamlReader& yaml, const YAML::Node& map) {
     return std::any_of(fields.begin(), fields.end(), [&](const char* field) { return yaml.has(map, field); });
   };
   if (yaml.text(map, "model") == "scale-misalignment-size-effect" || yaml.has(yaml.get(map, "accelerometers"), "rx_i")) {
-    yaml.complain(map, yaml.has(map, "model") ? "model" : "accelerometers",
-                  "scale-misalignment-size-effect gives each axis of the accelerometer a place of its own, which is not supported: "
-                  "calibrate with scale-misalignment");
+    yaml.complain(
+        map, yaml.has(map, "model") ? "model" : "accelerometers",
+        "scale-misalignment-size-effect gives each axis of the accelerometer a place of its own, which is not supported: "
+        "calibrate with scale-misalignment");
     return {};
   }
   ImuIntrinsics out;

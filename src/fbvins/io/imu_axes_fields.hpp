@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Not public: scale and axes of an IMU (ImuIntrinsics) in calibration files, as Kalibr, OpenVINS, RealSense and Basalt write them.
+// Not public: scale and axes of an IMU (ImuIntrinsics) in calibration files, as Kalibr, OpenVINS, RealSense and Basalt write
+// them.
 //
 //   ImuIntrinsics axes = read_imu_axes(yaml, yaml.root());   // none of the fields: an IMU without errors
 //

@@ -28,8 +28,8 @@ void expect_reading(const ImuIntrinsics& axes, const ImuSample& raw, const Vec3&
   EXPECT_LT((c.accel_mps2 - force).norm(), 1e-12) << c.accel_mps2.transpose();
 }
 
-/// By hand: w = (1, 2, 3) is (2, -1, 3) in the gyroscope's frame, M of it (2.02, -0.93, 3); f = (10, 20, 30) is (20, -10, 30) there,
-/// A of it (0.02, -0.02, 0); M of f (10.2, 19.7, 29.6).
+/// By hand: w = (1, 2, 3) is (2, -1, 3) in the gyroscope's frame, M of it (2.02, -0.93, 3); f = (10, 20, 30) is (20, -10, 30)
+/// there, A of it (0.02, -0.02, 0); M of f (10.2, 19.7, 29.6).
 TEST(ImuAxesFields, KalibrsGyroscopeHasAFrameOfItsOwn) {
   const auto imu = parse_imu({"imu.yaml", kKalibr});
   ASSERT_TRUE(imu) << imu.error().message;
@@ -38,12 +38,12 @@ TEST(ImuAxesFields, KalibrsGyroscopeHasAFrameOfItsOwn) {
 
 /// The same numbers, but OpenVINS feels forces in the IMU's frame: Tg f = (0.01, 0.04, 0).
 TEST(ImuAxesFields, OpenVinsFeelsForcesInTheImusFrame) {
-  const auto imu = parse_imu({"imu.yaml", kNoise +
-                                              "model: \"kalibr\"\nTw:\n  - [1.01, 0.0, 0.0]\n  - [0.03, 0.99, 0.0]\n  - [0.0, 0.0, 1.0]\n"
-                                              "R_IMUtoGYRO:\n  - [0.0, 1.0, 0.0]\n  - [-1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0]\n"
-                                              "Ta:\n  - [1.02, 0.0, 0.0]\n  - [0.01, 0.98, 0.0]\n  - [0.0, -0.02, 1.0]\n"
-                                              "R_IMUtoACC:\n  - [0.0, 1.0, 0.0]\n  - [-1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0]\n"
-                                              "Tg:\n  - [0.001, 0.0, 0.0]\n  - [0.0, 0.002, 0.0]\n  - [0.0, 0.0, 0.0]\n"});
+  const auto imu =
+      parse_imu({"imu.yaml", kNoise + "model: \"kalibr\"\nTw:\n  - [1.01, 0.0, 0.0]\n  - [0.03, 0.99, 0.0]\n  - [0.0, 0.0, 1.0]\n"
+                                      "R_IMUtoGYRO:\n  - [0.0, 1.0, 0.0]\n  - [-1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0]\n"
+                                      "Ta:\n  - [1.02, 0.0, 0.0]\n  - [0.01, 0.98, 0.0]\n  - [0.0, -0.02, 1.0]\n"
+                                      "R_IMUtoACC:\n  - [0.0, 1.0, 0.0]\n  - [-1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0]\n"
+                                      "Tg:\n  - [0.001, 0.0, 0.0]\n  - [0.0, 0.002, 0.0]\n  - [0.0, 0.0, 0.0]\n"});
   ASSERT_TRUE(imu) << imu.error().message;
   // Ta (20, -10, 30) = (20.4, -9.6, 30.2)
   expect_reading(imu->axes, {{}, {2.03, -0.89, 3}, {20.4, -9.6, 30.2}}, {1, 2, 3}, {10, 20, 30});
@@ -62,26 +62,30 @@ TEST(ImuAxesFields, RealSenseSaysWhatIsMadeOfAReading) {
   expect_reading(imu->axes, {{}, {1, 2, 3}, {1, 2, 3}}, {0.99, 2, 3.02}, {1.0, 1.8, 2.9});
 }
 
-/// (1 + S) raw - b; the accelerometer's six numbers are a lower triangle, column by column, the gyroscope's nine a matrix likewise.
+/// (1 + S) raw - b; the accelerometer's six numbers are a lower triangle, column by column, the gyroscope's nine a matrix
+/// likewise.
 TEST(ImuAxesFields, BasaltsNumbersGoColumnByColumn) {
   YamlReader yaml("calibration.json",
                   R"({"calib_accel_bias": [0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06],
                       "calib_gyro_bias": [0.01, 0.02, 0.03, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09]})");
   const ImuIntrinsics axes = read_basalt_axes(yaml, yaml.root());
   ASSERT_TRUE(yaml.ok()) << yaml.error().message;
-  expect_reading(axes, {{}, {1, 2, 3}, {1, 2, 3}}, {1 + .01 + .08 + .21 - .01, 2 + .02 + .10 + .24 - .02, 3 + .03 + .12 + .27 - .03},
+  expect_reading(axes, {{}, {1, 2, 3}, {1, 2, 3}},
+                 {1 + .01 + .08 + .21 - .01, 2 + .02 + .10 + .24 - .02, 3 + .03 + .12 + .27 - .03},
                  {1 + .01 - .1, 2 + .02 + .08 - .2, 3 + .03 + .10 + .18 - .3});
 }
 
 TEST(ImuAxesFields, WhatIsWrittenReadsBack) {
   ImuIntrinsics axes = parse_imu({"imu.yaml", kKalibr})->axes;
   axes.bias = {{0.01, 0.02, -0.03}, {0.1, -0.2, 1.0 / 3}};
-  const auto exact = parse_imu({"a", kNoise + imu_axes_text(axes, "", true)}), kalibr = parse_imu({"b", kNoise + imu_axes_text(axes, "", false)});
+  const auto exact = parse_imu({"a", kNoise + imu_axes_text(axes, "", true)}),
+             kalibr = parse_imu({"b", kNoise + imu_axes_text(axes, "", false)});
   ASSERT_TRUE(exact && kalibr);
   EXPECT_TRUE(exact->axes == axes) << "to the last bit";
   EXPECT_LT((kalibr->axes.gyro - axes.gyro).norm(), 1e-14);
   EXPECT_LT((kalibr->axes.gyro_by_force - axes.gyro_by_force).norm(), 1e-14);
-  EXPECT_NE(imu_axes_text(axes, "", false).find("  M:\n  - [1.01, 0.0, 0.0]\n"), std::string::npos) << imu_axes_text(axes, "", false);
+  EXPECT_NE(imu_axes_text(axes, "", false).find("  M:\n  - [1.01, 0.0, 0.0]\n"), std::string::npos)
+      << imu_axes_text(axes, "", false);
   EXPECT_EQ(imu_axes_text({}, "", true), "");
 }
 
@@ -99,17 +103,20 @@ TEST(ImuAxesFields, WhatNoImuHasIsRefused) {
     std::string text = kKalibr;
     return text.replace(text.find(from), from.size(), to);
   };
-  EXPECT_EQ(complaint(with("model: scale-misalignment", "model: scale-misalignment-size-effect")),
-            "imu.yaml:6: model: scale-misalignment-size-effect gives each axis of the accelerometer a place of its own, which is not "
-            "supported: calibrate with scale-misalignment");
-  EXPECT_NE(complaint(with("  M:\n  - [1.01, 0.0, 0.0]", "  M:\n  - [0.45, 0.0, 0.0]")).find("the gyroscope's scale is 0.4"), std::string::npos);
+  EXPECT_EQ(
+      complaint(with("model: scale-misalignment", "model: scale-misalignment-size-effect")),
+      "imu.yaml:6: model: scale-misalignment-size-effect gives each axis of the accelerometer a place of its own, which is not "
+      "supported: calibrate with scale-misalignment");
+  EXPECT_NE(complaint(with("  M:\n  - [1.01, 0.0, 0.0]", "  M:\n  - [0.45, 0.0, 0.0]")).find("the gyroscope's scale is 0.4"),
+            std::string::npos);
   EXPECT_NE(complaint(with("[1.02, 0.0, 0.0]", "[0.0, 0.0, 0.0]")).find("the accelerometer's scale is 0.0"), std::string::npos);
   EXPECT_NE(complaint(with("[1.02, 0.0, 0.0]", "[-1.02, 0.0, 0.0]")).find("left-handed"), std::string::npos);
   EXPECT_FALSE(complaint(with("[1.02, 0.0, 0.0]", "[.nan, 0.0, 0.0]")).empty());
   EXPECT_NE(complaint(with("[-1.0, 0.0, 0.0]", "[-1.2, 0.0, 0.0]")).find("C_gyro_i: is not a rotation"), std::string::npos);
   EXPECT_NE(complaint(with("[0.001, 0.0, 0.0]", "[0.1, 0.0, 0.0]")).find("sensitivity to forces"), std::string::npos);
   EXPECT_NE(complaint(kNoise + "gyroscope_bias: [0, 3, 0]\n").find("bias is more than"), std::string::npos);
-  EXPECT_NE(complaint(kNoise + "gyroscopes:\n  A: [0, 0, 0, 0, 0, 0, 0, 0, 0]\n").find("gyroscopes: has no matrix M"), std::string::npos);
+  EXPECT_NE(complaint(kNoise + "gyroscopes:\n  A: [0, 0, 0, 0, 0, 0, 0, 0, 0]\n").find("gyroscopes: has no matrix M"),
+            std::string::npos);
   EXPECT_NE(complaint(kNoise + "Tw: [1, 0, 0]\n").find("Tw: has 3 numbers"), std::string::npos);
 }
 

@@ -63,7 +63,8 @@ std::optional<TimeOffsetEstimate> read_time_offset(YamlReader& yaml) {
 }
 
 std::string text_of(const std::optional<TimeOffsetEstimate>& offset) {
-  return offset ? fmt::format("time_offset_s: {:.17g}\ntime_offset_sigma_s: {:.17g}\n", offset->s, offset->sigma_s) : std::string();
+  return offset ? fmt::format("time_offset_s: {:.17g}\ntime_offset_sigma_s: {:.17g}\n", offset->s, offset->sigma_s)
+                : std::string();
 }
 
 bool same(const ImuNoise& a, const ImuNoise& b) {
@@ -78,8 +79,8 @@ bool same(const ImuNoise& a, const ImuNoise& b) {
 Result<ImuState> parse_imu_state(const std::string& text, const std::string& file, const ImuNoise& imu) {
   YamlReader yaml(file, text);
   const YAML::Node root = yaml.root();
-  yaml.only(root, {"imu_state", "t_ns", "imu", "gyro_bias_radps", "accel_bias_mps2", "gyro_bias_covariance", "accel_bias_covariance",
-                   "time_offset_s", "time_offset_sigma_s"});
+  yaml.only(root, {"imu_state", "t_ns", "imu", "gyro_bias_radps", "accel_bias_mps2", "gyro_bias_covariance",
+                   "accel_bias_covariance", "time_offset_s", "time_offset_sigma_s"});
   if (const double version = yaml.number(root, "imu_state"); yaml.ok() && version != 1)
     yaml.complain(root, "imu_state", fmt::format("version {} is not known, only 1", version));
   const ImuNoise noise = read_imu_noise(yaml, yaml.get(root, "imu"), "rate_hz");

@@ -52,8 +52,10 @@ TEST(ImuStateFile, ATimeOffsetIsThereWholeOrNotAtAll) {
   EXPECT_EQ(read->time_offset->s, with_offset.time_offset->s);
   EXPECT_EQ(read->time_offset->sigma_s, with_offset.time_offset->sigma_s);
   EXPECT_NE(complaint(text() + "time_offset_s: 0.01\n").find("time_offset_sigma_s"), std::string::npos);
-  EXPECT_NE(complaint(text() + "time_offset_s: 9\ntime_offset_sigma_s: 0.001\n").find("time_offset_s: is more than 5 s"), std::string::npos);
-  EXPECT_NE(complaint(text() + "time_offset_s: 0\ntime_offset_sigma_s: 0\n").find("is not a standard deviation"), std::string::npos);
+  EXPECT_NE(complaint(text() + "time_offset_s: 9\ntime_offset_sigma_s: 0.001\n").find("time_offset_s: is more than 5 s"),
+            std::string::npos);
+  EXPECT_NE(complaint(text() + "time_offset_s: 0\ntime_offset_sigma_s: 0\n").find("is not a standard deviation"),
+            std::string::npos);
   EXPECT_NE(complaint(text() + "time_offset_s: .nan\ntime_offset_sigma_s: 1\n").find("time_offset_s"), std::string::npos);
 }
 

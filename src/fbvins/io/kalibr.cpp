@@ -9,8 +9,8 @@
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/foreign_files.hpp"
-#include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/imu_axes_fields.hpp"
+#include "fbvins/io/kalibr_imu.hpp"
 
 namespace fbvins {
 namespace {

@@ -24,7 +24,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above the range of any sensor
+constexpr double kLargestImuValue = 1e6;          // rad/s or m/s^2: far above the range of any sensor
 constexpr Duration kImuLeadIn = {1'000'000'000};  // before the first frame: of use for starting up
 // The partner of an image is searched for among this many frames before it.
 constexpr std::ptrdiff_t kPairingReach = 8;

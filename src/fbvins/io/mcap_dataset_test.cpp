@@ -158,7 +158,8 @@ TEST_F(FlightRecordTest, KeepsReadingsOfAidingSensors) {
     ahead.direction_B = Vec3::UnitX(), ahead.t = t - Duration{kMs};
     VelocitySample wheel{.t = t, .v_mps = Vec3(k, 0.1, 0), .sigma_mps = Vec3(0.1, 0.2, kUnmeasured_mps), .p_B = Vec3(0, 0, -0.3)};
     wheel.q_BS = so3_exp(Vec3(0.1, 0.2, 0.3));
-    for (const AidingSample& r : {AidingSample(ahead), AidingSample(down), AidingSample(wheel), AidingSample(PressureSample{t, 1e5 + k, 3})})
+    for (const AidingSample& r :
+         {AidingSample(ahead), AidingSample(down), AidingSample(wheel), AidingSample(PressureSample{t, 1e5 + k, 3})})
       events.emplace_back(r);
     events.emplace_back(frame(50 * k));
   }

@@ -19,7 +19,9 @@ constexpr std::size_t kPose = 8, kPoseAndVelocity = 11, kAngles = 7, kState = 17
 /// Years 2001 to 2096.
 bool is_date(double seconds) { return seconds > 1e9 && seconds < 4e9; }
 
-const char* name_of(double unit_ns) { return unit_ns == 1 ? "nanoseconds" : unit_ns == 1e3 ? "microseconds" : unit_ns == 1e6 ? "milliseconds" : "seconds"; }
+const char* name_of(double unit_ns) {
+  return unit_ns == 1 ? "nanoseconds" : unit_ns == 1e3 ? "microseconds" : unit_ns == 1e6 ? "milliseconds" : "seconds";
+}
 
 /// The unit in which the stamps are dates, or else, of large numbers, have a usual step; `usual` where neither says anything.
 double unit_of(const std::vector<double>& stamps, double usual) {
@@ -85,7 +87,8 @@ double largest_angle(const std::vector<std::vector<double>>& rows) {
 std::optional<bool> w_first_by(std::string_view header) {
   std::string text(header);
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const auto& [w, x] : {std::pair("qw", "qx"), {"q_w", "q_x"}, {"q_rs_w", "q_rs_x"}, {"orientation.w", "orientation.x"}, {"rot_w", "rot_x"}})
+  for (const auto& [w, x] :
+       {std::pair("qw", "qx"), {"q_w", "q_x"}, {"q_rs_w", "q_rs_x"}, {"orientation.w", "orientation.x"}, {"rot_w", "rot_x"}})
     if (text.find(w) != std::string::npos && text.find(x) != std::string::npos) return text.find(w) < text.find(x);
   return std::nullopt;
 }
@@ -156,8 +159,8 @@ Result<TrajectoryLayout> recognise(const std::vector<CsvLine>& data, std::string
     if (row.size() > layout.stamp && std::isfinite(row[layout.stamp])) stamps.push_back(row[layout.stamp]);
   const bool euroc = layout.separator != ' ' && whole && layout.stamp == 0;
   if (euroc && layout.columns > kPose && layout.columns != kPoseAndVelocity && layout.columns < kState)
-    return Error{ErrorCode::malformed, fmt::format("{}:{}: {} columns where {}, {} or at least {} are needed", file, data.front().number,
-                                                   layout.columns, kPose, kPoseAndVelocity, kState)};
+    return Error{ErrorCode::malformed, fmt::format("{}:{}: {} columns where {}, {} or at least {} are needed", file,
+                                                   data.front().number, layout.columns, kPose, kPoseAndVelocity, kState)};
   layout.unit_ns = wanted.unit_ns > 0 ? wanted.unit_ns : unit_of(stamps, euroc ? 1 : 1e9);
   const std::optional<bool> named = w_first_by(header);
   layout.w_first = wanted.w_first.value_or(named.value_or(euroc));

@@ -17,13 +17,13 @@
 namespace fbvins {
 
 struct TrajectoryLayout {
-  char separator = ' ';        ///< ' ': runs of blanks and tabs
-  std::size_t stamp = 0;       ///< column; 1 behind a running number
-  std::size_t columns = 8;     ///< without empty ones at the end
-  double unit_ns = 1e9;        ///< of the stamps
-  bool w_first = false;        ///< quaternion's order
-  bool velocity = false;       ///< three columns behind the pose, in W
-  bool state = false;          ///< EuRoC's: velocity and two biases
+  char separator = ' ';           ///< ' ': runs of blanks and tabs
+  std::size_t stamp = 0;          ///< column; 1 behind a running number
+  std::size_t columns = 8;        ///< without empty ones at the end
+  double unit_ns = 1e9;           ///< of the stamps
+  bool w_first = false;           ///< quaternion's order
+  bool velocity = false;          ///< three columns behind the pose, in W
+  bool state = false;             ///< EuRoC's: velocity and two biases
   bool quaternion_first = false;  ///< before the position: OpenVINS' state_est.txt
   bool angles = false;            ///< roll, pitch and yaw instead of a quaternion
   double angle_rad = 1;           ///< their unit

@@ -46,7 +46,9 @@ RowVerdict parse_row(const TrajectoryLayout& layout, const std::vector<std::stri
   const auto number = t ? std::nullopt : parse_double(stamp);
   problem = t ? "a value is not a usable number"
               : fmt::format("'{}' is not a stamp in {}", stamp.substr(0, 40),
-                            layout.unit_ns == 1 ? "nanoseconds" : layout.unit_ns == 1e9 ? "seconds" : "its unit");
+                            layout.unit_ns == 1     ? "nanoseconds"
+                            : layout.unit_ns == 1e9 ? "seconds"
+                                                    : "its unit");
   if (!t) return number && std::isnan(*number) ? RowVerdict::not_finite : RowVerdict::malformed;
   point.t = *t;
   double v[16];
@@ -62,7 +64,8 @@ RowVerdict parse_row(const TrajectoryLayout& layout, const std::vector<std::stri
     return set_pose(v, q.w(), q.x(), q.y(), q.z(), point, problem);
   }
   if (layout.quaternion_first) std::rotate(v, v + 4, v + 7);
-  return layout.w_first ? set_pose(v, v[3], v[4], v[5], v[6], point, problem) : set_pose(v, v[6], v[3], v[4], v[5], point, problem);
+  return layout.w_first ? set_pose(v, v[3], v[4], v[5], v[6], point, problem)
+                        : set_pose(v, v[6], v[3], v[4], v[5], point, problem);
 }
 
 bool says_no_pose(const std::vector<std::string_view>& fields) {
@@ -121,7 +124,8 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
     else out.points.push_back(std::move(row.point));
   }
   out.counts.not_finite += nan_rows;
-  if (nan_rows > 0 && out.counts.first_bad.empty()) out.counts.first_bad = fmt::format("{}: a value is not a usable number", file);
+  if (nan_rows > 0 && out.counts.first_bad.empty())
+    out.counts.first_bad = fmt::format("{}: a value is not a usable number", file);
   if (out.points.empty() && nan_rows == 0)
     return Error{ErrorCode::malformed, fmt::format("{}: {}", file, no_pose_sentence(health))};
   if (out.points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: no row has a pose", file)};

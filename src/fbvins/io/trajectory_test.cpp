@@ -177,15 +177,16 @@ const std::vector<std::string> kSeconds = {"1403636584.763555584", "1403636584.8
 const std::string kWFirst = ",1,2,3,0.70710678,0,0,0.70710678", kWLast = " 1 2 3 0 0 0.70710678 0.70710678";
 
 TEST(Trajectory, AsOtherSystemsWriteIt) {
-  expect_last(three(kNs, kWFirst, ",\n"), "");                                                          // VINS-Fusion
-  expect_last(three(kNs, kWFirst + ",0.1,0.2,0.3", ",\n"), "the velocity behind the pose");              // VINS-Mono
+  expect_last(three(kNs, kWFirst, ",\n"), "");                                               // VINS-Fusion
+  expect_last(three(kNs, kWFirst + ",0.1,0.2,0.3", ",\n"), "the velocity behind the pose");  // VINS-Mono
   expect_last(three({"1403636584763555584.000000", "1403636584813555456.000000", "1403636584863555584.000000"}, kWLast),
-              "stamps in nanoseconds");                                                                  // ORB-SLAM3
+              "stamps in nanoseconds");  // ORB-SLAM3
   expect_last(three({"1403636584763555", "1403636584813555", "1403636584863555"}, kWLast), "stamps in microseconds");
   expect_last(three({"1403636584763.555584", "1403636584813.555456", "1403636584863.555584"}, kWLast), "stamps in milliseconds");
   expect_last(three({"1.403636584763555584e+18", "1.403636584813555456e+18", "1.403636584863555584e+18"},
-                    " 1.0e+00 2.0e+00 3.0e+00 0 0 7.0710678e-01 7.0710678e-01"), "stamps in nanoseconds");  // numpy
-  expect_last(three(kSeconds, kWLast + " 1e-6 0 1e-6", "  \r\n"), "3 further columns left out");          // OpenVINS
+                    " 1.0e+00 2.0e+00 3.0e+00 0 0 7.0710678e-01 7.0710678e-01"),
+              "stamps in nanoseconds");                                                           // numpy
+  expect_last(three(kSeconds, kWLast + " 1e-6 0 1e-6", "  \r\n"), "3 further columns left out");  // OpenVINS
   expect_last("num,t,x,y,z,qx,qy,qz,qw\n" + three({"0,1403636584.763555", "1,1403636584.813555", "2,1403636584.863555584"},
                                                   ",1,2,3,0,0,0.70710678,0.70710678"),
               "a running number before the stamp, stamps in seconds, quaternions x y z w");

@@ -21,7 +21,8 @@ class Notes final : public Sink {
   explicit Notes(Taken& taken) : taken_(taken) {}
   std::string_view name() const override { return "notes"; }
   Result<void> take(const LiveEvent& event) override {
-    taken_.stamps.push_back(std::visit(Overloaded{[](const AidingSample& r) { return stamp_of(r).ns; }, [](const auto& e) { return e.t.ns; }}, event));
+    taken_.stamps.push_back(std::visit(
+        Overloaded{[](const AidingSample& r) { return stamp_of(r).ns; }, [](const auto& e) { return e.t.ns; }}, event));
     return {};
   }
   Result<void> finish() override {

@@ -236,7 +236,7 @@ std::vector<OutputFigure> MavlinkSink::figures() const {
   const MavlinkLinkState s = state();
   return {{"connected", s.connected},           {"flight_controller", s.flight_controller}, {"clock_known", s.clock_known},
           {"clock_offset_s", s.clock_offset_s}, {"round_trip_ms", s.round_trip_ms},         {"poses_sent", s.poses_sent},
-          {"poses_withheld", s.poses_withheld}, {"frames_dropped", s.frames_dropped}, {"readings", s.readings}};
+          {"poses_withheld", s.poses_withheld}, {"frames_dropped", s.frames_dropped},       {"readings", s.readings}};
 }
 
 Result<void> MavlinkSink::finish() {

@@ -245,8 +245,7 @@ Result<SocketMessage> parse_aiding(std::span<const std::byte> bytes) {
   const Quat q_BS(m->q_BS[0], m->q_BS[1], m->q_BS[2], m->q_BS[3]);
   if (m->sensor == FBVINS_SOCKET_RANGE)
     reading = RangeSample{t, m->value[0], m->sigma[0], Vec3(m->p_BS), q_BS * Vec3::UnitX(), m->nearest_m, m->farthest_m};
-  else if (m->sensor == FBVINS_SOCKET_VELOCITY)
-    reading = VelocitySample{t, Vec3(m->value), Vec3(m->sigma), Vec3(m->p_BS), q_BS};
+  else if (m->sensor == FBVINS_SOCKET_VELOCITY) reading = VelocitySample{t, Vec3(m->value), Vec3(m->sigma), Vec3(m->p_BS), q_BS};
   else if (m->sensor == FBVINS_SOCKET_PRESSURE) reading = PressureSample{t, m->value[0], m->sigma[0]};
   else return malformed(fmt::format("aiding: sensor is {}, not 0 to 2", m->sensor));
   return SocketMessage(impossible(reading).empty() ? SocketAiding{std::move(reading)} : SocketAiding{});

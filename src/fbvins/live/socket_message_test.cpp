@@ -175,7 +175,8 @@ TEST(SocketMessage, PositionsAndHeights) {
 }
 
 TEST(SocketMessage, ReadingsOfAidingSensors) {
-  RangeSample range{.t = Time{77}, .distance_m = 1.5, .sigma_m = 0.01, .p_B = Vec3(0.1, 0, 0.2), .direction_B = Vec3(0.6, 0, -0.8)};
+  RangeSample range{
+      .t = Time{77}, .distance_m = 1.5, .sigma_m = 0.01, .p_B = Vec3(0.1, 0, 0.2), .direction_B = Vec3(0.6, 0, -0.8)};
   VelocitySample velocity{.t = Time{78}, .v_mps = Vec3(1, 2, 3), .sigma_mps = Vec3(0.1, 0.2, kUnmeasured_mps)};
   velocity.p_B = Vec3(-0.1, 0, 0), velocity.q_BS = so3_exp(Vec3(0, 0.3, 1));
   const auto back = [](const AidingSample& reading) {

@@ -5,8 +5,8 @@
 //   NormalSums sums = whitened_sums(noise, stamps_s, rows);    // rows: Jacobian | residual, in order of time
 //   SerialNoise fitted = fit_serial_noise(...);                // by restricted likelihood
 //
-// Formulas: docs/derivations/hand_eye.md. The whitening is a scalar Kalman filter that runs over every column alike, so that its innovations
-// are the rows multiplied by the inverse square root of the covariance, in linear time.
+// Formulas: docs/derivations/hand_eye.md. The whitening is a scalar Kalman filter that runs over every column alike, so that its
+// innovations are the rows multiplied by the inverse square root of the covariance, in linear time.
 #pragma once
 
 #include <Eigen/Core>

@@ -30,7 +30,8 @@ class Feedback {
   void publish(FrameId frame, const StatePrior& prior, LandmarkUpdate landmarks);
   /// Waits until the estimator has finished frame - kLag.
   Message for_frame(FrameId frame);
-  /// The same wait: keeps the caller from getting further ahead of the estimator. The correction of the time offset for this frame.
+  /// The same wait: keeps the caller from getting further ahead of the estimator. The correction of the time offset for this
+  /// frame.
   Duration time_offset_for(FrameId frame);
   /// Ends all waiting, now and later.
   void stop();

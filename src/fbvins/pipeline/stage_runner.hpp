@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The owner of the stages' threads: runs one function on a thread of its own until it returns. An exception in a stage ends neither
-// the thread nor the program; it becomes the status that the caller sees.
+// The owner of the stages' threads: runs one function on a thread of its own until it returns. An exception in a stage ends
+// neither the thread nor the program; it becomes the status that the caller sees.
 #pragma once
 
 #include <exception>

@@ -60,7 +60,7 @@ struct System::Impl {
 
   RunMode mode;
   ExposureOffsets own_offsets;  ///< of the rig's cameras
-  VirtualPinholes lenses;             ///< makes of a wide lens the cameras that the frontend and the estimator are given
+  VirtualPinholes lenses;       ///< makes of a wide lens the cameras that the frontend and the estimator are given
   PacketMaker packet_maker;
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
@@ -274,10 +274,11 @@ void System::on_map_update(std::function<void(const MapUpdate&)> callback) { imp
 Result<void> System::push(SensorEvent event) {
   if (impl_->finished && impl_->status.get())
     return Error{ErrorCode::invalid_argument, "push() after finish(): the system has ended"};
-  const Result<void> taken = std::visit(Overloaded{[this](ImuSample& sample) { return impl_->packet_maker.push(sample), Result<void>{}; },
-                                                   [this](StereoFrame& frame) { return impl_->push(std::move(frame)), Result<void>{}; },
-                                                   [this](const AidingSample& reading) { return impl_->push(reading); }},
-                                        event);
+  const Result<void> taken =
+      std::visit(Overloaded{[this](ImuSample& sample) { return impl_->packet_maker.push(sample), Result<void>{}; },
+                            [this](StereoFrame& frame) { return impl_->push(std::move(frame)), Result<void>{}; },
+                            [this](const AidingSample& reading) { return impl_->push(reading); }},
+                 event);
   if (!taken) return taken;
   impl_->forward(false);
   return impl_->status.get();

@@ -46,13 +46,13 @@ class Ros2Sink final : public Sink {
   Ros2Stamps stamps_;
   Pose<B, BaseLink> T_B_base_;
   Ros2Publisher odometry_, transforms_, fixed_, path_, diagnostics_;
-  double reading_variance_ = 0;              // of one gyroscope reading, (rad/s)^2
-  Mat3 rate_covariance_ = Mat3::Zero();      // of w_WB_B
-  std::optional<MapUpdate> map_;             // the newest, if T_MW is known
-  Trajectory<W> way_;                        // the path of base_link, a pose every kPathStep_m
-  std::uint32_t reset_counter_ = 0;          // of the path
+  double reading_variance_ = 0;               // of one gyroscope reading, (rad/s)^2
+  Mat3 rate_covariance_ = Mat3::Zero();       // of w_WB_B
+  std::optional<MapUpdate> map_;              // the newest, if T_MW is known
+  Trajectory<W> way_;                         // the path of base_link, a pose every kPathStep_m
+  std::uint32_t reset_counter_ = 0;           // of the path
   std::optional<std::uint32_t> told_resets_;  // of the last odometry message
-  std::optional<Time> transformed_, shown_;  // when the last of each was sent, in the messages' time
+  std::optional<Time> transformed_, shown_;   // when the last of each was sent, in the messages' time
 };
 
 }  // namespace fbvins

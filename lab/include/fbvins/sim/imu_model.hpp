@@ -52,8 +52,8 @@ struct ImuModelOptions {
     v("accel_range_mps2", accel_range_mps2, "m/s^2", "readings saturate here", 1.0, 10000.0);
     v("gyro_step_radps", gyro_step_radps, "rad/s", "quantisation step, 0 for none", 0.0, 0.1);
     v("accel_step_mps2", accel_step_mps2, "m/s^2", "quantisation step, 0 for none", 0.0, 1.0);
-    v("stamp_jitter_us", stamp_jitter_us, "us", "noise of the readings' stamps, standard deviation, less than half an interval", 0.0,
-      1e4);
+    v("stamp_jitter_us", stamp_jitter_us, "us", "noise of the readings' stamps, standard deviation, less than half an interval",
+      0.0, 1e4);
   }
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras and IMUs that people have, by their data sheets and public calibrations (docs/experiments/simulator.md has the sources).
+// Cameras and IMUs that people have, by their data sheets and public calibrations (docs/experiments/simulator.md has the
+// sources).
 //
 //   SimulationOptions options = *simulation_preset("handheld");
 //   if (Result<void> used = use_sensors(options, "d435i"); !used) return used.error();

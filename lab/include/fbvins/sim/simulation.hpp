@@ -44,7 +44,8 @@ struct CalibrationErrorOptions {
   void visit(V&& v) {
     v("focal_share", focal_share, "", "error of each camera's focal length, 0.01 is 1 %", 0.0, 0.2);
     v("centre_px", centre_px, "px", "error of each principal point", 0.0, 50.0);
-    v("pair_share", pair_share, "", "the right camera's errors are the left one's and this share of its own; 1: its own alone", 0.0, 1.0);
+    v("pair_share", pair_share, "", "the right camera's errors are the left one's and this share of its own; 1: its own alone",
+      0.0, 1.0);
     v("mounting_deg", mounting_deg, "deg", "error of the rotation between cameras and IMU, about each axis", 0.0, 45.0);
     v("place_mm", place_mm, "mm", "error of the cameras' place on the IMU, along each axis", 0.0, 500.0);
     v("imu_noise_factor", imu_noise_factor, "", "declared noise densities over the true ones", 1e-3, 1e3);
@@ -140,8 +141,8 @@ class FlightRecorder;
 
 /// A recording that is rendered frame by frame.
 struct Simulation {
-  StereoRig rig;                          ///< as it is
-  StereoRig calibrated;                   ///< as the recording's calibration says
+  StereoRig rig;         ///< as it is
+  StereoRig calibrated;  ///< as the recording's calibration says
   SplineTrajectory flight;
   Time start;
   SimulatedImu imu;
