@@ -124,7 +124,7 @@ void bind_camera(nb::module_& m) {
       .def("__repr__", &text_of);
 }
 
-void bind_sensors(nb::module_& m) {
+void bind_imu_axes(nb::module_& m) {
   const auto matrix = [](const std::vector<std::vector<double>>& rows, const char* name) {
     Mat3 out;
     if (rows.size() != 3) throw nb::value_error(fmt::format("{} is not a matrix of 3 rows", name).c_str());
@@ -174,7 +174,9 @@ void bind_sensors(nb::module_& m) {
             return std::array{a.bias.accel_mps2.x(), a.bias.accel_mps2.y(), a.bias.accel_mps2.z()};
           },
           "m/s^2");
+}
 
+void bind_imu_noise(nb::module_& m) {
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")
       .def(
           "__init__",
@@ -198,7 +200,9 @@ void bind_sensors(nb::module_& m) {
       .def_ro("accel_random_walk", &ImuNoise::accel_random_walk_mps3_rthz, "m/s^3/sqrt(Hz)")
       .def_ro("rate_hz", &ImuNoise::rate_hz)
       .def_ro("axes", &ImuNoise::axes, "scale and axes");
+}
 
+void bind_depth_sensor(nb::module_& m) {
   nb::class_<DepthSensor>(
       m, "DepthSensor",
       "A sensor of depth images that are registered to the left camera, pixel by pixel, or have a lens and a pose "
@@ -285,7 +289,9 @@ void bind_stereo_rig(nb::module_& m) {
 
 void bind_rig(nb::module_& m) {
   bind_camera(m);
-  bind_sensors(m);
+  bind_imu_axes(m);
+  bind_imu_noise(m);
+  bind_depth_sensor(m);
   bind_stereo_rig(m);
   m.def("_restore_rig", [](const std::string& yaml) { return value_or_raise(parse_rig(yaml, "the rig")); });
 

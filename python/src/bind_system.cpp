@@ -11,6 +11,7 @@
 #include "fbvins/config/config.hpp"
 #include "fbvins/io/imu_state_file.hpp"
 #include "fbvins/pipeline/system.hpp"
+#include "images.hpp"
 #include "kept.hpp"
 #include "python_types.hpp"
 
@@ -19,29 +20,6 @@ namespace {
 
 std::optional<ImuState> imu_state(const std::string& path, const ImuNoise& imu) {
   return path.empty() ? std::nullopt : value_or_raise(read_imu_state(path, imu));
-}
-
-/// An image in an array's memory, which is not copied: the array is kept alive until the last reader is done.
-std::shared_ptr<const Image> image_of(nb::handle object, const char* name, const Camera& camera) {
-  if (object.is_none()) return nullptr;
-  auto array = checked<std::uint8_t>(object, name, {camera.height(), camera.width()});
-  PyObject* kept = array.keeper.release().ptr();
-  std::shared_ptr<const std::uint8_t> keeper(array.data, [kept](const std::uint8_t*) {
-    const nb::gil_scoped_acquire acquired;
-    Py_DECREF(kept);
-  });
-  return std::make_shared<const Image>(camera.width(), camera.height(), std::move(keeper));
-}
-
-/// A copy: a depth image is read at a few places, once.
-std::shared_ptr<const DepthImage> depth_of(nb::handle object, const StereoRig& rig) {
-  if (object.is_none()) return nullptr;
-  if (!rig.depth) throw nb::value_error("depth: the rig has no depth sensor");
-  const Camera& camera = rig.depth_camera();
-  const auto array = checked<std::uint16_t>(object, "depth", {camera.height(), camera.width()});
-  auto depth = std::make_shared<DepthImage>(DepthImage{camera.width(), camera.height(), {}});
-  depth->mm.assign(array.data, array.data + static_cast<std::size_t>(depth->width) * depth->height);
-  return depth;
 }
 
 class PySystem {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
@@ -14,6 +13,7 @@
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/euroc_root.hpp"
 #include "fbvins/io/euroc_rows.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/image_decode.hpp"
@@ -28,30 +28,6 @@ namespace {
 constexpr std::uint64_t kLargestTruth_bytes = std::uint64_t{1} << 30u, kLargestBeside_bytes = std::uint64_t{1} << 28u;
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
-
-Result<std::string> find_root(const FileSource& files, const std::string& path) {
-  std::vector<std::string> roots;
-  for (int i = 0; i < kMostCameras && roots.empty(); ++i) roots = files.folders_holding(fmt::format("cam{}/data.csv", i));
-  if (roots.empty()) roots = files.folders_holding("cam0/sensor.yaml");  // its CSV is what is missing
-  if (roots.empty()) {
-    std::error_code ignored;
-    const bool bag = std::filesystem::exists(path + "/metadata.yaml", ignored);
-    return Error{ErrorCode::not_found, fmt::format("{}: no cam0/data.csv in it: not a EuRoC dataset{}", path,
-                                                   bag ? fmt::format(" ({})", kAboutRosBags) : "")};
-  }
-  if (roots.size() > 1)
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{}: holds {} datasets ({} ...), give one of them", path, roots.size(), roots[0])};
-  return roots.front();
-}
-
-/// Last part of the path, without mav0 and without .zip.
-std::string dataset_name(const std::string& path) {
-  std::filesystem::path p = std::filesystem::path(path).lexically_normal();
-  if (!p.has_filename()) p = p.parent_path();
-  if (p.filename() == "mav0" && p.has_parent_path()) p = p.parent_path();
-  return p.extension() == ".zip" ? p.stem().string() : p.filename().string();
-}
 
 /// Opens one recording step by step; each step leaves its findings in `out`.
 class EurocReader {
@@ -336,17 +312,7 @@ class EurocReader {
     out_.info.ground_truth_rows = truth->counts;
     out_.info.ground_truth_poses = static_cast<int>(truth->points.size());
     out_.ground_truth = std::move(truth->points);
-    move_to_imu(T_BS.inverse() * T_BI_);
-  }
-
-  /// From the sensor whose pose the file gives to the IMU; the identity in EuRoC.
-  void move_to_imu(const Pose<B, B>& T_SI) {
-    if (T_SI.p.norm() < 1e-9 && T_SI.q.vec().norm() < 1e-9) return;
-    for (TrajectoryPoint& point : out_.ground_truth) {
-      point.T_WB = point.T_WB * T_SI;
-      point.v_WB.reset();  // would need the angular rate
-      point.bias.reset();
-    }
+    refer_to_imu(out_.ground_truth, T_BS.inverse() * T_BI_);
   }
 
   void describe_frames() {

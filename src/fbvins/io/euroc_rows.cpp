@@ -112,4 +112,13 @@ Result<TrajectoryFile> parse_truth(const std::string& csv, const std::string& fi
   return out;
 }
 
+void refer_to_imu(std::vector<TrajectoryPoint>& truth, const Pose<B, B>& T_SI) {
+  if (T_SI.p.norm() < 1e-9 && T_SI.q.vec().norm() < 1e-9) return;
+  for (TrajectoryPoint& point : truth) {
+    point.T_WB = point.T_WB * T_SI;
+    point.v_WB.reset();  // would need the angular rate
+    point.bias.reset();
+  }
+}
+
 }  // namespace fbvins

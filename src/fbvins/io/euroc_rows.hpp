@@ -38,4 +38,7 @@ std::vector<std::string> row_warnings(const RowCounts& counts, const std::string
 /// alike; where the truth's did not, only what lies before the step is used.
 Result<TrajectoryFile> parse_truth(const std::string& csv, const std::string& file, const JoinedClock& clock);
 
+/// The same poses of the IMU, from those of a sensor that lies at T_SI; the identity in EuRoC.
+void refer_to_imu(std::vector<TrajectoryPoint>& truth, const Pose<B, B>& T_SI);
+
 }  // namespace fbvins

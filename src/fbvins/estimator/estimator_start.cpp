@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the estimator starts: the first window, and whether it is good enough to be published.
+#include "fbvins/core/stage_timer.hpp"
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
+#include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/integrity_thresholds.hpp"
+#include "fbvins/estimator/mono_start.hpp"
+
+namespace fbvins {
+namespace {
+
+using namespace thresholds;
+
+/// Of a start with one camera.
+constexpr double kMaxScaleSigmaAtStart = 0.15;
+/// Likewise: 5 % of right ones are refused, and tried again with the next image (chi-square, three numbers).
+constexpr double kMaxBiasSigmasAtStart = 2.8;
+/// For so long: axes and scale of a gyroscope that nobody has calibrated look like a bias that changes.
+constexpr double kBiasRefused_s = 1;
+/// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
+constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
+
+}  // namespace
+
+void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& out) {
+  CpuTimer timer;
+  TrackedFrame weighted = frame;
+  weighted.imu.noise = reading_noise_.of(frame.imu);
+  const std::optional<InitialSolution> start = initialiser_.process(weighted, rest, calibration_, restart_pose_);
+  out.odometry.stats.prepare_ms = timer.lap_ms();
+  if (!start || (!start->from_rest && !time_alignment_.known())) {
+    out.odometry.health = health_.before_start(frame, initialiser_.reason());
+    return;
+  }
+  open_window(*start);
+  running_ = true;
+  health_.start();
+  solve(out.odometry, kThorough);
+  // The first solve may have moved the first frame far: the prior is linearised anew at its state.
+  window_.restart_first_estimates();
+  window_.set_pivot(window_.newest().state.T_FB.p);
+  const WindowSolution& solution = solve(out.odometry, kThorough);
+  out.odometry.health = judge(frame, out.odometry);
+  if (start_is_good(frame, out.odometry)) {
+    shrink_window(solution, out);
+    compare_carried(out.odometry);
+    if (carried_.contradicted()) out.odometry.health = health_.contradicted();
+    return;
+  }
+  refuse_start(out.odometry);
+}
+
+/// One pair of several is enough. With one camera its scale has to be known, too, and the gyroscope's bias be one that the tracks
+/// show without a start.
+bool Estimator::start_is_good(const TrackedFrame& frame, const Odometry& solved) {
+  const bool a_pair_sees = solved.health.reason == HealthReason::one_camera && frame.stats.stereo > 0;
+  if (solved.health.state != HealthState::good && !a_pair_sees) return false;
+  const Vec3 v_WB = window_.tilt().levelled(window_.newest().state).v_FB;
+  if (!one_camera_) return true;
+  if (!(scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart)) return false;
+  const Vec3& gyro_bias_radps = window_.newest().state.bias.gyro_radps;
+  if (time_alignment_.off_sigmas(gyro_bias_radps, solved.gyro_bias_covariance) < kMaxBiasSigmasAtStart) return true;
+  if (!bias_refused_) bias_refused_ = frame.t;
+  return (frame.t - *bias_refused_).seconds() > kBiasRefused_s;
+}
+
+/// Nothing of it is published.
+void Estimator::refuse_start(Odometry& out) {
+  running_ = false;
+  calibration_ = calibrated_;
+  if (!one_camera_) initialiser_.reset();  // with one camera the same frames and a later one may do
+  window_.clear();
+  const EstimatorStats stats = out.stats;
+  out = {};
+  out.stats = stats;
+  out.health = health_.start_refused();
+}
+
+void Estimator::open_window(const InitialSolution& start) {
+  window_.clear();
+  for (std::size_t i = 0; i < start.frames.size(); ++i) {
+    const TrackedFrame& tracked = start.frames[i];
+    Frame frame = frame_of_start(start, i, imu_noise_);
+    frame.factors = factors_.make({tracked, tracked.features, frame, window_, calibration_, start.from_rest, true});
+    window_.add_frame(std::move(frame), tracked.features, calibration_);
+  }
+  const NavState<G>& first = window_.frames().oldest().state;
+  WindowPrior prior = first_frame_prior(first, start.biases);
+  if (weights_of(options_).calibrating()) prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
+  window_.set_prior(std::move(prior));
+  published_.restart();
+  monitor_.restart();
+  carried_.begin_window();
+  frames_with_readings_ = kFramesAfterGap;
+  uncertainty_.restart();
+}
+
+}  // namespace fbvins
