@@ -100,7 +100,7 @@ def main(program):
         alone = fly(program, flight, folder / "out_alone", *OFF)
         error, without = (r["accuracy"]["ape_m"]["rmse"] for r in (aided, alone))
         print(f"one camera: RMSE {1e3 * error:.1f} mm with the sensors, {1e3 * without:.1f} mm without, {aided['health']}")
-        assert error < 0.8 * without
+        assert error < 0.95 * without
         assert not any("disagrees" in reason for reason in aided["health"]), aided["health"]
         check_formats(program, flight, folder, error)
         check_record(program, flight, folder)
