@@ -11,15 +11,18 @@
 namespace fbvins {
 namespace aiding_models_test {
 
-Simulation flight() {
-  auto options = *simulation_preset("normal");
-  options.flight.duration_s = 6;
-  options.range.rate_hz = 20, options.velocity.rate_hz = 50, options.barometer.rate_hz = 25;
-  return *prepare_simulation(options);
+const Simulation& flight() {
+  static const Simulation made = [] {
+    auto options = *simulation_preset("normal");
+    options.flight.duration_s = 6;
+    options.range.rate_hz = 20, options.velocity.rate_hz = 50, options.barometer.rate_hz = 25;
+    return *prepare_simulation(options);
+  }();
+  return made;
 }
 
 TEST(AidingModels, ReadingsOfAllComeInOrder) {
-  const Simulation s = flight();
+  const Simulation& s = flight();
   EXPECT_TRUE(std::ranges::is_sorted(s.aiding, {}, [](const AidingSample& r) { return stamp_of(r); }));
   EXPECT_NEAR(static_cast<double>(readings_of<RangeSample>(s.aiding).size()), 20 * s.flight.duration_s(), 2);
   EXPECT_NEAR(static_cast<double>(readings_of<VelocitySample>(s.aiding).size()), 50 * s.flight.duration_s(), 2);
@@ -28,7 +31,7 @@ TEST(AidingModels, ReadingsOfAllComeInOrder) {
 }
 
 TEST(AidingModels, AVelocityIsThatOfThePlaceOfTheSensor) {
-  const Simulation s = flight();
+  const Simulation& s = flight();
   VelocityModelOptions exact;
   exact.rate_hz = 40, exact.noise_mps = 0, exact.scale_error = 0, exact.vertical = true;
   for (const VelocitySample& r : simulate_velocities(s.flight, Mat3::Identity(), exact, s.start, 1)) {
@@ -40,7 +43,7 @@ TEST(AidingModels, AVelocityIsThatOfThePlaceOfTheSensor) {
 }
 
 TEST(AidingModels, PressureFallsWithTheHeight) {
-  const Simulation s = flight();
+  const Simulation& s = flight();
   PressureModelOptions exact;
   exact.rate_hz = 40, exact.noise_pa = 0, exact.drift_pa_rts = 0;
   const auto readings = simulate_pressures(s.flight, exact, s.start, 1);
