@@ -19,7 +19,7 @@ void RecordingArguments::add_to(CLI::App& command) {
   // One argument, so that a recording which follows it is not taken for another topic.
   command.add_option_function<std::string>(
       "--topics", [this](const std::string& text) { topics = CLI::detail::split(text, ','); },
-      "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU][,DEPTH]");
+      "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU][,DEPTH][,sensors beside them]");
   command.add_flag("--recording-time", by_recording,
                    "of a bag: the times of recording instead of stamps that its driver did not set");
   command
