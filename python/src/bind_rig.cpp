@@ -134,9 +134,9 @@ void bind_imu_axes(nb::module_& m) {
     }
     return out;
   };
-  const auto rows = [](const Mat3& m) {
+  const auto rows = [](const Mat3& of) {
     std::vector<std::vector<double>> out(3);
-    for (int i = 0; i < 3; ++i) out[i] = {m(i, 0), m(i, 1), m(i, 2)};
+    for (int i = 0; i < 3; ++i) out[i] = {of(i, 0), of(i, 1), of(i, 2)};
     return out;
   };
   nb::class_<ImuIntrinsics>(m, "ImuIntrinsics",

@@ -45,12 +45,14 @@ Result<std::unique_ptr<MavlinkSigner>> make_signer(const std::string& key_file, 
 
 /// Without all keyframes of the map.
 MapUpdate where_M_is(const MapUpdate& update) {
-  return {.localised = update.localised,
-          .found = update.found,
-          .T_MW_smooth = update.T_MW_smooth,
-          .anchored = update.anchored,
-          .M_moved = update.M_moved,
-          .reset_counter = update.reset_counter};
+  MapUpdate out;
+  out.localised = update.localised;
+  out.found = update.found;
+  out.T_MW_smooth = update.T_MW_smooth;
+  out.anchored = update.anchored;
+  out.M_moved = update.M_moved;
+  out.reset_counter = update.reset_counter;
+  return out;
 }
 
 }  // namespace
