@@ -41,4 +41,4 @@ def test_a_recording_brings_them_and_a_system_takes_them(with_sensors):
     assert counts[fbvins.RangeSample] == pytest.approx(80, abs=3)
     assert counts[fbvins.VelocitySample] == pytest.approx(200, abs=5)
     assert counts[fbvins.PressureSample] == pytest.approx(100, abs=3)
-    assert sum(o.health.state == "good" for o in odometry) > 40
+    assert sum(o.health == "good" for o in odometry) > 40
