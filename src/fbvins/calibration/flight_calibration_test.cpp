@@ -43,7 +43,7 @@ TEST(FlightView, DerivativesAreThoseOfDifferences) {
   const FlightRig rig = flight_rig(flight_scene_rig());
   const test::Motion motion;
   const ViewPlace at{
-      motion.state(3.0, {{0.01, 0.02, -0.01}, {}}), {motion.rate_B(3.0), motion.specific_force_B(3.0)}, 9.81, 0.003};
+      motion.state(3.0, {{0.01, 0.02, -0.01}, Vec3::Zero()}), {motion.rate_B(3.0), motion.specific_force_B(3.0)}, 9.81, 0.003};
   const Vec3 p_W = at.state.T_FB * (rig.T_BC0 * Vec3(0.4, -0.3, 2.5));
   ViewDerivatives d;
   const auto pixel = view_of(rig, 1, at, p_W, &d);
