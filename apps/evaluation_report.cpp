@@ -14,7 +14,9 @@ std::string row(std::string_view name, const ErrorStatistics& s) {
 
 Json numbers(const auto& vector) { return Json(std::vector<double>(vector.begin(), vector.end())); }
 
-Json to_json(const PoseNees& n) { return Json{{"position", n.position}, {"orientation", n.orientation}, {"pose", n.pose}}; }
+Json pose_nees_json(const PoseNees& n) {
+  return Json{{"position", n.position}, {"orientation", n.orientation}, {"pose", n.pose}};
+}
 
 }  // namespace
 
@@ -52,8 +54,10 @@ Json to_json(const Coverage& c) {
 }
 
 Json to_json(const NeesSummary& n) {
-  return Json{
-      {"count", n.count}, {"unusable", n.unusable}, {"mean", to_json(n.mean)}, {"share_within_95", to_json(n.share_within_95)}};
+  return Json{{"count", n.count},
+              {"unusable", n.unusable},
+              {"mean", pose_nees_json(n.mean)},
+              {"share_within_95", pose_nees_json(n.share_within_95)}};
 }
 
 std::string to_table(const Evaluation& e, Alignment alignment) {

@@ -62,7 +62,7 @@ include(cmake/FbvinsEigen.cmake)
 # eight again. For these modules, and for tests, each of which has a namespace of its own; in other targets two sources define the
 # same local names. Unlike in CMake's own unity builds, no path of this folder is in what is compiled, so that ccache knows it in
 # another clone.
-set(FBVINS_UNITY_MODULES ${FBVINS_SANITIZED_MODULES} calibration flight)
+set(FBVINS_UNITY_MODULES ${FBVINS_SANITIZED_MODULES} calibration calibration_base checkup config flight report sim v4l2)
 option(FBVINS_UNITY "Compile several sources of a target as one" OFF)
 set(FBVINS_UNITY_SIZE 8)
 if(FBVINS_UNITY)  # a source is no header, though it is included; GCC collects garbage less often: a sixth of the time for a fifth more memory

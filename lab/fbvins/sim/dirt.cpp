@@ -16,7 +16,7 @@ constexpr double kSmallest = 0.03, kLargest = 0.07, kLength = 0.25, kHalfHair = 
 /// Light that it takes, and what it reflects: mud is dark, a dried drop bright.
 constexpr double kThinnest = 0.65, kThickest = 0.95, kDarkest = 0.03, kBrightest = 0.8;
 /// Mean reflectance of a room, by which the light follows from the mean radiance.
-constexpr float kRoom = 0.45f;
+constexpr float kMeanReflectance = 0.45f;
 
 /// From 1 inside to 0 outside of an edge, `beyond` it in widths of the blur.
 double inside(double beyond) { return 1 / (1 + std::exp(2 * beyond)); }
@@ -73,7 +73,7 @@ void Dirt::add_hair(double x, double y, double length, std::uint64_t seed) {
 void Dirt::draw(std::vector<float>& radiance) const {
   double sum = 0;
   for (const float value : radiance) sum += std::min(value, 3.0f);  // a lamp counts as what is white
-  const float light = static_cast<float>(sum / static_cast<double>(radiance.size())) / kRoom;
+  const float light = static_cast<float>(sum / static_cast<double>(radiance.size())) / kMeanReflectance;
   for (std::size_t i = 0; i < radiance.size(); ++i) radiance[i] += opacity_[i] * (light * reflectance_[i] - radiance[i]);
 }
 

@@ -13,15 +13,14 @@ namespace {
 
 constexpr double kLowest_m = 0.8;   ///< of the waypoint box, above the floor
 constexpr double kGround_m = 0.22;  ///< height of a vehicle that stands on its legs
-constexpr double kPi = std::numbers::pi;
 
 /// A sum of sines with incommensurate frequencies: smooth and bounded.
 class Wander {
  public:
   Wander(Rng& rng, double lowest_hz, double highest_hz, double amplitude, int terms = 5) {
     for (int i = 0; i < terms; ++i)
-      terms_.push_back({2 * kPi * lowest_hz * std::pow(highest_hz / lowest_hz, (i + rng.uniform()) / terms),
-                        rng.uniform(0, 2 * kPi), amplitude / std::sqrt(terms) * 1.4});
+      terms_.push_back({2 * std::numbers::pi * lowest_hz * std::pow(highest_hz / lowest_hz, (i + rng.uniform()) / terms),
+                        rng.uniform(0, 2 * std::numbers::pi), amplitude / std::sqrt(terms) * 1.4});
   }
   double operator()(double t) const {
     double sum = 0;
@@ -89,7 +88,7 @@ std::vector<double> yaws_along(const TimedPath& path, const FlightOptions& o, Rn
     if (std::hypot(d.x(), d.y()) > 0.25 * dt * static_cast<double>(after - before)) {
       const double heading = std::atan2(d.y(), d.x());
       if (!known) std::fill(yaw.begin(), yaw.begin() + static_cast<std::ptrdiff_t>(i), heading);
-      last = known ? last + std::remainder(heading - last, 2 * kPi) : heading;
+      last = known ? last + std::remainder(heading - last, 2 * std::numbers::pi) : heading;
       known = true;
     }
     yaw[i] = last;
@@ -130,7 +129,7 @@ SplineTrajectory hover(const FlightOptions& o, const Quat& q_VB, Rng& rng) {
   const Vec3 home(0, 0, kLowest_m + 0.5 * o.extent_z_m);
   TimedPath path;
   std::vector<double> yaw;
-  const double heading = rng.uniform(-kPi, kPi);
+  const double heading = rng.uniform(-std::numbers::pi, std::numbers::pi);
   for (double t = 0; t < o.duration_s; t += path.knot_spacing_s) {
     const double fade = fade_in(t, 0, 3);
     path.positions.push_back(home + fade * drift(t));
@@ -163,7 +162,7 @@ SplineTrajectory handheld(const FlightOptions& o, const Quat& q_VB, Rng& rng) {
 Quat body_in_vehicle(const StereoRig& rig, double camera_pitch_deg) {
   Mat3 R_VC0;  // columns: the camera's right, down and forward in V
   R_VC0 << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  const Quat pitch = so3_exp(Vec3(0, camera_pitch_deg * kPi / 180, 0));
+  const Quat pitch = so3_exp(Vec3(0, camera_pitch_deg * std::numbers::pi / 180, 0));
   return (pitch * Quat(R_VC0) * rig.T_BC0.q.conjugate()).normalized();
 }
 

@@ -9,8 +9,6 @@
 namespace fbvins {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 Quat about_z(double angle) { return so3_exp(Vec3(0, 0, angle)); }
 
 }  // namespace
@@ -33,7 +31,7 @@ bool RoomPopulator::add_shelf(const Wall& wall, double at) {
 bool RoomPopulator::add_table(const Vec3& floor_point) {
   const double w = rng_.uniform(0.4, 0.8), d = rng_.uniform(0.3, 0.45), h = rng_.uniform(0.65, 0.8);
   if (!is_clear(floor_point + Vec3(0, 0, h), std::hypot(w, d) + 0.2)) return false;
-  const Quat q = about_z(rng_.uniform(0, kPi));
+  const Quat q = about_z(rng_.uniform(0, std::numbers::pi));
   const int top = plain_or({Surface::wood}), leg = texture(Surface::metal);
   add_box(world_.facets, {floor_point + Vec3(0, 0, h), Vec3(w, d, 0.02), q}, top, tint(), 1.0);
   for (int i = 0; i < 4; ++i)
@@ -43,7 +41,7 @@ bool RoomPopulator::add_table(const Vec3& floor_point) {
             leg, 0.8f, 0.4);
   for (int i = 0; i < 4; ++i) {
     const double a = rng_.uniform(0.04, 0.14), b = rng_.uniform(0.04, 0.14), c = rng_.uniform(0.03, 0.2);
-    const double x = rng_.uniform(-0.75, 0.75) * w, y = rng_.uniform(-0.7, 0.7) * d, angle = rng_.uniform(0, kPi);
+    const double x = rng_.uniform(-0.75, 0.75) * w, y = rng_.uniform(-0.7, 0.7) * d, angle = rng_.uniform(0, std::numbers::pi);
     const int what = plain_or({Surface::cardboard, Surface::books, Surface::panel, Surface::page, Surface::picture});
     add_box(world_.facets, {floor_point + Vec3(0, 0, h + 0.02 + c) + q * Vec3(x, y, 0), Vec3(a, b, c), about_z(angle)}, what,
             tint(), 0.35);
@@ -58,7 +56,7 @@ bool RoomPopulator::add_box_stack(const Vec3& floor_point) {
                  c = std::exp(rng_.uniform(std::log(0.08), std::log(0.45)));
     const Vec3 centre = floor_point + Vec3(0, 0, z + c);
     if (!is_clear(centre, Vec3(a, b, c).norm())) return i > 1;
-    const double angle = rng_.uniform(0, kPi);
+    const double angle = rng_.uniform(0, std::numbers::pi);
     const int what = plain_or({Surface::cardboard, Surface::cardboard, Surface::panel, Surface::wood, Surface::metal,
                                Surface::cloth, Surface::poster, Surface::picture});
     add_box(world_.facets, {centre, Vec3(a, b, c), about_z(angle)}, what, tint(), std::max(0.4, 2 * std::max({a, b, c})));
@@ -74,7 +72,7 @@ bool RoomPopulator::add_tangle(const Vec3& floor_point) {
   for (double z = 0; z < height; z += 0.3)
     if (!is_clear(floor_point + Vec3(0, 0, z), crown)) return false;
   const auto within = [&](double radius, double z) {
-    const double angle = rng_.uniform(0, 2 * kPi), r = radius * std::sqrt(rng_.uniform());
+    const double angle = rng_.uniform(0, 2 * std::numbers::pi), r = radius * std::sqrt(rng_.uniform());
     return Vec3(floor_point + Vec3(r * std::cos(angle), r * std::sin(angle), z));
   };
   const int what = plain_or({Surface::metal, Surface::wood, Surface::cloth});

@@ -4,13 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/sim/normal3.hpp"
+
 namespace fbvins {
 namespace {
-
-Vec3 normal3(Rng& rng, double sigma) {
-  const double x = rng.normal(), y = rng.normal(), z = rng.normal();
-  return sigma * Vec3(x, y, z);
-}
 
 /// Diagonal: scale; off the diagonal: misalignment.
 Mat3 crooked_axes(Rng& rng, double scale, double angle) {

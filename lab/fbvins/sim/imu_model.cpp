@@ -6,14 +6,10 @@
 #include <numbers>
 
 #include "fbvins/sim/imu_errors.hpp"
+#include "fbvins/sim/normal3.hpp"
 
 namespace fbvins {
 namespace {
-
-Vec3 normal3(Rng& rng, double sigma) {
-  const double x = rng.normal(), y = rng.normal(), z = rng.normal();
-  return sigma * Vec3(x, y, z);
-}
 
 /// Four rotors at slightly different, slowly varying speeds shake every axis.
 class Vibration {

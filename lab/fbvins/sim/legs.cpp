@@ -13,9 +13,9 @@ namespace {
 /// Of the image's width: half a leg's width, its reach into the image, a patch of its paint.
 constexpr double kHalfWidth = 0.024, kShortest = 0.16, kLongest = 0.28, kPatch = 0.009;
 /// Reflectance of paint, and how much darker a round leg is at its sides.
-constexpr double kDarkest = 0.03, kBrightest = 0.75, kSides = 0.5;
+constexpr double kDarkestPaint = 0.03, kBrightestPaint = 0.75, kSides = 0.5;
 /// Mean reflectance of a room, by which the light follows from the mean radiance.
-constexpr float kRoom = 0.45f;
+constexpr float kRoomReflectance = 0.45f;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ Legs::Legs(int width, int height, int count, int camera)
                                        : Vec2(-std::cos(tilt), std::sin(tilt));
     const double half_width = width * kHalfWidth * rng.uniform(0.8, 1.3), patch = width * kPatch;
     std::vector<double> paint(4096);
-    for (double& grey : paint) grey = rng.uniform(kDarkest, kBrightest);
+    for (double& grey : paint) grey = rng.uniform(kDarkestPaint, kBrightestPaint);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const Vec2 from_foot = Vec2(x, y) - foot;
@@ -53,7 +53,7 @@ Legs::Legs(int width, int height, int count, int camera)
 void Legs::draw(std::vector<float>& radiance) const {
   double sum = 0;
   for (const float value : radiance) sum += std::min(value, 3.0f);  // a lamp counts as what is white
-  const float light = static_cast<float>(sum / static_cast<double>(radiance.size())) / kRoom;
+  const float light = static_cast<float>(sum / static_cast<double>(radiance.size())) / kRoomReflectance;
   for (std::size_t i = 0; i < radiance.size(); ++i)
     if (reflectance_[i] >= 0) radiance[i] = light * reflectance_[i];
 }

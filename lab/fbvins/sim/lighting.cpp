@@ -11,7 +11,6 @@
 namespace fbvins {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kNode_m = 0.22;
 constexpr double kReach_m = 9.0;      ///< lamps farther away are ignored
 constexpr double kOcclusion_m = 0.9;  ///< things nearer than this occlude ambient light
@@ -156,8 +155,9 @@ LightState light_at(const LightOptions& options, const World& world, double t_s,
   if (options.change == "flicker") {
     const auto burst = static_cast<std::int64_t>(std::floor(t_s * 12));  // a failing fluorescent tube
     const double drop = hashed(seed, burst) < 0.3 ? 0.6 : 0.0;
-    state.group[kLampsA] = std::max(0.05, 1 - k * (drop + 0.15 * std::sin(2 * kPi * 3.1 * t_s)));
-    state.group[kLampsB] = std::max(0.05, 1 + k * (0.3 * std::sin(2 * kPi * 0.7 * t_s) + 0.12 * std::sin(2 * kPi * 7.3 * t_s)));
+    state.group[kLampsA] = std::max(0.05, 1 - k * (drop + 0.15 * std::sin(2 * std::numbers::pi * 3.1 * t_s)));
+    state.group[kLampsB] = std::max(
+        0.05, 1 + k * (0.3 * std::sin(2 * std::numbers::pi * 0.7 * t_s) + 0.12 * std::sin(2 * std::numbers::pi * 7.3 * t_s)));
     state.group[kAmbient] = 0.6 + 0.2 * (state.group[kLampsA] + state.group[kLampsB]);
   } else if (options.change == "switching") {
     const auto phase = static_cast<std::int64_t>(std::floor(t_s / 3.5));

@@ -7,11 +7,7 @@
 #include <numbers>
 
 namespace fbvins {
-namespace {
-
-constexpr double kPi = std::numbers::pi;
-
-}  // namespace
+namespace {}  // namespace
 
 void paint_all(World& world, std::uint64_t seed) {
   std::vector<std::future<Canvas>> canvases;  // each with its own random numbers: the result does not depend on the threads
@@ -195,17 +191,17 @@ void RoomPopulator::cover_floors() {
     const double amount = options_.floor_marks * room.area();
     int layer = 0;
     for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
-      const double size = rng_.uniform(0.8, 1.6), angle = rng_.uniform(0, kPi);
+      const double size = rng_.uniform(0.8, 1.6), angle = rng_.uniform(0, std::numbers::pi);
       const int what = texture(rng_.uniform() < 0.75 ? Surface::mat : Surface::picture);
       lay_on_floor(somewhere(), angle, size, size, what, size, layer++);
     }
     for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
-      const double length = rng_.uniform(1.0, 3.0), angle = rng_.uniform(0, kPi);
+      const double length = rng_.uniform(1.0, 3.0), angle = rng_.uniform(0, std::numbers::pi);
       const int what = texture(Surface::marks);
       lay_on_floor(somewhere(), angle, length, 0.13, what, 0.45, layer++);
     }
     for (int i = 0; i < static_cast<int>(0.5 * amount); ++i) {
-      const double size = rng_.uniform(0.08, 0.3), angle = rng_.uniform(0, kPi), shape = rng_.uniform(0.5, 1.0);
+      const double size = rng_.uniform(0.08, 0.3), angle = rng_.uniform(0, std::numbers::pi), shape = rng_.uniform(0.5, 1.0);
       const Surface kinds[] = {Surface::page, Surface::plaster, Surface::plaster, Surface::checker};
       const int what = texture(kinds[rng_.below(4)]);
       lay_on_floor(somewhere(), angle, size, size * shape, what, size, layer++);
@@ -306,7 +302,7 @@ void RoomPopulator::add_movers() {
     mover.from = somewhere();
     mover.to = somewhere();
     mover.round_trip_s = std::max(4.0, 2 * (mover.to - mover.from).norm() / rng_.uniform(0.4, 0.9));
-    mover.phase_rad = rng_.uniform(0, 2 * kPi);
+    mover.phase_rad = rng_.uniform(0, 2 * std::numbers::pi);
     mover.spin_radps = rng_.uniform(-0.5, 0.5);
     if (i % 2 == 0) {
       const int coat = texture(Surface::cloth), trousers = texture(Surface::carpet), skin = texture(Surface::plaster);

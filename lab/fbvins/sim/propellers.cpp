@@ -11,7 +11,7 @@ namespace fbvins {
 namespace {
 
 /// Of the image's width: a blade's length and half its chord.
-constexpr double kLength = 0.36, kHalfChord = 0.018;
+constexpr double kBladeLength = 0.36, kHalfChord = 0.018;
 /// Of black blades in the light that falls into the view, and how often a small vehicle's turn.
 constexpr float kReflectance = 0.06f;
 constexpr double kSlowest_hz = 90, kFastest_hz = 130;
@@ -32,7 +32,7 @@ Propellers::Propellers(int width, int height, int count, int camera) : width_(wi
 /// Of a pixel from the hub; negative where no blade reaches.
 double Propellers::radius_px(const Propeller& propeller, int x, int y) const {
   const double r = (Vec2(x, y) - propeller.hub).norm();
-  return r < kLength * width_ && r > 1 ? r : -1;
+  return r < kBladeLength * width_ && r > 1 ? r : -1;
 }
 
 void Propellers::draw(std::vector<float>& radiance, double t_s, double exposure_s, double line_delay_s) const {

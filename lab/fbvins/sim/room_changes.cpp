@@ -10,7 +10,6 @@
 namespace fbvins {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 /// Of furniture from the path; of a camera from a surface and from a wall.
 constexpr double kFurnitureClearance_m = 0.55, kCameraClearance_m = 0.35;
 constexpr int kTries = 40;
@@ -123,7 +122,7 @@ void move_furniture(World& world, double share, const std::vector<Vec3>& path, R
   std::sort(order.rbegin(), order.rend());  // from the end, so that what is taken out moves none that follows
   for (const std::size_t i : order) {
     const Extent extent = extent_of(world, world.furniture[i]);
-    const double turn_rad = rng.uniform(-kPi, kPi);
+    const double turn_rad = rng.uniform(-std::numbers::pi, std::numbers::pi);
     if (const auto to = place_for(world, extent, path, rng)) put(world, world.furniture[i], extent.centre, *to, turn_rad);
     else take_out(world, i);
   }

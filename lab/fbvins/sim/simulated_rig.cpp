@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "fbvins/core/angle.hpp"
-#include "fbvins/core/rng.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/sim/normal3.hpp"
 #include "fbvins/sim/sensor_kits.hpp"
 #include "fbvins/sim/simulation.hpp"
 
@@ -57,11 +57,6 @@ StereoRig in_axes_of(const StereoRig& rig, StereoRig kit) {
   kit.T_BC0 = turn * kit.T_BC0;
   kit.T_BC1 = turn * kit.T_BC1;
   return kit;
-}
-
-Vec3 normal3(Rng& rng, double sigma) {
-  const double x = rng.normal(), y = rng.normal(), z = rng.normal();
-  return sigma * Vec3(x, y, z);
 }
 
 /// Share of the focal length, and of the principal point in px.

@@ -12,8 +12,8 @@
 namespace fbvins {
 namespace {
 
-constexpr double kNearest_m = 0.35, kDistance_px = 30;
-constexpr int kCorners = 120, kFewestMatches = 30;
+constexpr double kNearest_m = 0.35, kSpacing_px = 30;
+constexpr int kMostCorners = 120, kFewestMatches = 30;
 /// Matches that chance makes along a line are about a tenth of the true ones.
 constexpr double kTimesMore = 3;
 
@@ -36,7 +36,7 @@ bool StereoOrder::swapped() const { return as_swapped >= kFewestMatches && as_sw
 StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> frames) {
   const StereoRig other = mirrored(rig);
   KltStereoMatcher as_named(rig, kNearest_m), as_swapped(other, kNearest_m);
-  ShiTomasiDetector detector(kDistance_px);
+  ShiTomasiDetector detector(kSpacing_px);
   Pyramid left, right;
   StereoOrder order;
   for (const StereoFrame& frame : frames) {
@@ -44,7 +44,7 @@ StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> fram
       continue;
     left.build(frame.left->view(), kKltLevels);
     right.build(frame.right->view(), kKltLevels);
-    const std::vector<Corner>& corners = detector.detect(left, {}, kCorners, rig.left.mask().get());
+    const std::vector<Corner>& corners = detector.detect(left, {}, kMostCorners, rig.left.mask().get());
     order.features += static_cast<int>(corners.size());
     order.as_named += matches(as_named, rig.left, left, right, corners);
     order.as_swapped += matches(as_swapped, other.left, left, right, corners);

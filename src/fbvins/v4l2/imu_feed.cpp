@@ -18,7 +18,7 @@ namespace fbvins {
 namespace {
 
 constexpr int kTick_ms = 20;
-constexpr Duration kTryAgainAfter{500'000'000};
+constexpr Duration kOpenAgainAfter{500'000'000};
 
 class MavlinkFeed final : public ImuFeed {
  public:
@@ -47,7 +47,7 @@ class MavlinkFeed final : public ImuFeed {
  private:
   void keep_open(Time now) {
     if (link_.is_open() || now < next_try_) return;
-    next_try_ = now + kTryAgainAfter;
+    next_try_ = now + kOpenAgainAfter;
     if (link_.open()) imu_.restart();
   }
   /// Reports the connection's state when it has changed.
