@@ -49,12 +49,12 @@ sources:
 examples:
   fbvins live --source replay:MH_01_easy --out out/live
   fbvins live --source replay:MH_01_easy@4 --frontend orb --quiet --out out/fast
-  fbvins live --source socket:/run/fbvins.sock --out out/live
+  fbvins live --source socket:/run/fbvins/sensors.sock --out out/live
   fbvins live --source replay:MH_01_easy --map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
   fbvins live --source replay:MH_01_easy --web 8080
-  fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor finds
+  fbvins live --source socket:/run/fbvins/sensors.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor finds
 )";
 
 struct Arguments {

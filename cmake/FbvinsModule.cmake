@@ -50,10 +50,9 @@ target_compile_options(fbvins_flags INTERFACE
   # No implicit fused multiply-add, so that kernels give the same bits with every instruction set.
   -ffp-contract=off
   $<$<BOOL:${FBVINS_WERROR}>:-Werror>
-  # GCC 12 sees overflows in std::string's operator+ that are none (its bug 105651).
-  $<$<AND:$<BOOL:${FBVINS_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=stringop-overflow>
-  $<$<AND:$<BOOL:${FBVINS_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=array-bounds>
-  $<$<AND:$<BOOL:${FBVINS_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=restrict>)
+  # These depend on what GCC inlines, and are false in std::string and std::optional (its bugs 105651 and 80635). Clang's warnings
+  # and the sanitizers look for the same mistakes.
+  "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-maybe-uninitialized;-Wno-restrict;-Wno-stringop-overflow>")
 
 include(cmake/FbvinsPrecompiled.cmake)
 include(cmake/FbvinsEigen.cmake)

@@ -99,7 +99,7 @@ def check_launch_files(root, program):
     help_text = subprocess.run([program, "live", "--help"], check=True, capture_output=True, text=True, timeout=60).stdout
     options = set(re.findall(r"--[a-z0-9-]+", help_text))
     full = {"config": "a.yaml", "calibration": "chain.yaml", "imu_calibration": "imu.yaml", "interface": "eth0", "arguments": "--map 'flat one.fbm' --quiet"}
-    expected = {("live.launch.py", ""): ["socket:/run/fbvins.sock"], ("d435i.launch.py", ""): ["d435i"], ("oak.launch.py", ""): ["oak"],
+    expected = {("live.launch.py", ""): ["socket:/run/fbvins/sensors.sock"], ("d435i.launch.py", ""): ["d435i"], ("oak.launch.py", ""): ["oak"],
                 ("topics.launch.py", ""): ["ros2:/camera/camera/infra1/image_rect_raw,/camera/camera/infra2/image_rect_raw,/camera/camera/imu"],
                 ("topics.launch.py", "bag"): ["ros2:/camera/camera/infra1/image_rect_raw,/camera/camera/infra2/image_rect_raw,/camera/camera/imu"]}
     require({name for name, _ in expected} | {"component.launch.py"} == {f.name for f in folder.glob("*")}, "a launch file that this test does not know")

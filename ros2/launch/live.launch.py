@@ -2,7 +2,7 @@
 r"""
 `fbvins live` with its topics in this domain, and RViz if wanted.
 
-ros2 launch fbvins_ros2 live.launch.py source:=socket:/run/fbvins.sock \
+ros2 launch fbvins_ros2 live.launch.py source:=socket:/run/fbvins/sensors.sock \
     arguments:="--map flat.fbm" rviz:=true
 """
 
@@ -22,7 +22,7 @@ from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
 ARGUMENTS = (
-    ("source", "socket:/run/fbvins.sock", "as of fbvins live --source"),
+    ("source", "socket:/run/fbvins/sensors.sock", "as of fbvins live --source"),
     ("program", "fbvins", "the program, where it is not on the PATH"),
     ("domain", EnvironmentVariable("ROS_DOMAIN_ID", default_value="0"), "ROS_DOMAIN_ID"),
     (

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sends sensor data to a socket source (docs/socket.md) like a driver in another process, for a simulated vehicle. One owner.
 //
-//   Result<std::unique_ptr<SocketSender>> sender = SocketSender::connect("/run/fbvins.sock", rig);
+//   Result<std::unique_ptr<SocketSender>> sender = SocketSender::connect("/run/fbvins/sensors.sock", rig);
 //   (*sender)->send(reading);
 //   (*sender)->send(frame);
 #pragma once

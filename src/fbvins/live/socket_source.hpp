@@ -2,7 +2,7 @@
 // Sensors of another process, over a Unix socket (docs/socket.md). One sender at a time; one that crashes, sends garbage or
 // has another version is disconnected with a sentence, and the next one may connect.
 //
-//   auto source = SocketSource::open("/run/fbvins.sock", {.rig = *rig, .say = warn});
+//   auto source = SocketSource::open("/run/fbvins/sensors.sock", {.rig = *rig, .say = warn});
 //   live.add_sink((*source)->status_sink());          // senders get the estimator's health, and M
 //   Result<void> end = (*source)->run(live.input());  // until stop()
 #pragma once
