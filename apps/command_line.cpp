@@ -13,6 +13,10 @@
 #include "apps/terminal.hpp"
 
 namespace fbvins::app {
+
+/// Commit, compiler and features (cmake/BuildInfo.cmake).
+extern const char* const kBuildInfo;
+
 namespace {
 
 constexpr const char* kExamples = R"(examples:
@@ -48,7 +52,8 @@ int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> co
                      std::initializer_list<HandedOver> elsewhere) {
   keep_standard_streams();
   CLI::App program{"FB-VINS: stereo visual-inertial odometry", "fbvins"};
-  program.set_version_flag("--version", "fbvins " FBVINS_VERSION);
+  program.set_version_flag("--version", fmt::format("fbvins {}\n{}", FBVINS_VERSION, kBuildInfo),
+                           "version, commit, compiler and features");
   program.footer(kExamples);
   program.require_subcommand(1);
   int exit_code = kOk;

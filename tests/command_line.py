@@ -62,7 +62,7 @@ class CommandLine(unittest.TestCase):
         self.assertNotIn("\033", done.stderr, "colour only on a terminal")
 
     def test_help_and_version(self):
-        self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
+        self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\ncommit: .+\ncompiler: .+\nfeatures: .*\n$")
         for command in ([], ["run"], ["calibrate"], ["target"], ["simulate", "board"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"], ["view"], ["map"], ["record"], ["px4"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)

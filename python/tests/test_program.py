@@ -16,7 +16,7 @@ def says(*arguments):
 
 def test_it_is_the_program():
     done = says("--version")
-    assert (done.returncode, done.stdout) == (0, f"fbvins {fbvins.__version__}\n"), done
+    assert done.returncode == 0 and done.stdout.startswith(f"fbvins {fbvins.__version__}\n"), done
     assert says("run", "/nowhere").returncode == 2
 
 
