@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Files of other programs, each written from the facts of its format with numbers of this test's own: read where they are given, or
-named with what to do. docs/reach.md says which kinds; --table prints each with its answer.
+named with what to do. docs/experiments/reach.md says which kinds; --table prints each with its answer.
 
 usage: foreign_files.py FBVINS [--table]
 """

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A barometer: the pressure says how high the body is above a level that drifts, a variable of the window for every few seconds
-// (docs/barometer.md; docs/derivations/barometer.md, P1-P3). Readings that jump are left out, as when a door opens or the
+// (docs/barometer.md; docs/derivations/aiding.md, P1-P3). Readings that jump are left out, as when a door opens or the
 // vehicle's wind comes back from the ground; where the jump stays, a new level begins.
 #pragma once
 

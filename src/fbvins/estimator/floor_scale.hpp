@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scale of one camera by a rangefinder: landmarks that lie on the floor are so far below the body as the images say, and the
-// floor is as far as the beam says (docs/derivations/range.md, R4-R6).
+// floor is as far as the beam says (docs/derivations/aiding.md, R4-R6).
 #pragma once
 
 #include <optional>

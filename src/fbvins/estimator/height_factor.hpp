@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A point of the body lies on a level that is a variable of the window, or so far above it: the floor that a beam hits
-// (range_factor.hpp), what a barometer calls zero (barometer_factor.hpp). docs/derivations/range.md, R1-R2.
+// (range_factor.hpp), what a barometer calls zero (barometer_factor.hpp). docs/derivations/aiding.md, R1-R2.
 #pragma once
 
 #include <memory>

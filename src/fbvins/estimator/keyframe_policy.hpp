@@ -26,7 +26,7 @@ class KeyframePolicy {
   void shrink(SlidingWindow& window, const WindowSolution& solution, const Calibration& calibration);
 
   /// Index of the keyframe that leaves, out of the first `keyframes` frames. `oldest`: 0.
-  /// `entropy`: the one with the least information on the newest state (docs/derivations/entropy.md, E4).
+  /// `entropy`: the one with the least information on the newest state (docs/derivations/window.md, E4).
   int leaving(const SlidingWindow& window, const Calibration& calibration, int keyframes);
 
  private:

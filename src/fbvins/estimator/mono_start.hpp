@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first states of a flight in motion with one camera (docs/derivations/mono.md, O1-O8). Images of one camera have no scale;
-// readings have. From tracks and readings together: the gyroscope's bias from the directions of the tracks, then velocity,
+// The first states of a flight in motion with one camera (docs/derivations/alignment.md, O1-O8). Images of one camera have no
+// scale; readings have. From tracks and readings together: the gyroscope's bias from the directions of the tracks, then velocity,
 // gravity, accelerometer bias and the points as one linear problem, which needs no structure from motion before it.
 //
 //   std::optional<std::vector<NavState<G>>> states = start_with_one_camera(frames, T_BC, noise, biases, 9.81);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A rangefinder: what its beam hits lies on a level floor, whose height is a variable of the window (docs/rangefinder.md;
-// docs/derivations/range.md, R1-R3). Heights above the same floor are compared over the whole flight, which shows the scale of
+// docs/derivations/aiding.md, R1-R3). Heights above the same floor are compared over the whole flight, which shows the scale of
 // one camera. Where the beam comes to a table, a box or a stair another floor begins; readings that lie on none are left out.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sensor of velocity in the body: wheels, optical flow over a known height (docs/velocity.md; docs/derivations/velocity.md,
+// A sensor of velocity in the body: wheels, optical flow over a known height (docs/velocity.md; docs/derivations/aiding.md,
 // V1-V2). Readings far from the predicted velocity are left out: wheels slip, and flow over a moving shadow is of the shadow.
 #pragma once
 

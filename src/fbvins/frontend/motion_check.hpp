@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds tracks on moving objects. However many of them agree with one another, they disagree with the camera's motion that
-// is predicted from the estimator's state and the IMU (docs/derivations/moving.md). Small errors of the prediction are first
+// is predicted from the estimator's state and the IMU (docs/derivations/integrity.md). Small errors of the prediction are first
 // corrected by the tracks.
 // Buffers are reused; one instance, one thread.
 //
