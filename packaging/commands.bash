@@ -29,7 +29,7 @@ cmd_package() {
   page_tools "$folder"
   local options=(-DCMAKE_INSTALL_PREFIX=/usr -DFBVINS_BUILD_TESTS=OFF -DCMAKE_SKIP_INSTALL_ALL_DEPENDENCY=ON -DFBVINS_UNITY=ON)
   if [[ $architecture == "$own" ]]; then
-    need "${BUILD_PACKAGES[@]}" dpkg-dev
+    need "${BUILD_PACKAGES[@]}" dpkg-dev file  # CPack finds the programs' libraries by file
     configure release "$folder" "${options[@]}"
   elif [[ $architecture == arm64 ]]; then
     configure_arm64 "$folder" "${options[@]}" -DFBVINS_BUILD_LAB=OFF  # a board does not need the laboratory
@@ -122,7 +122,6 @@ cmd_release() {
   local version tag python lacking=()
   version=$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
   tag=v$version
-  grep -q "^## \[$version\] - " CHANGELOG.md || die "CHANGELOG.md has no section [$version] with a date"
   [[ $(git rev-parse --quiet --verify "refs/tags/$tag^{commit}") == $(git rev-parse HEAD) ]] || die "the tag $tag is not what is checked out"
   [[ -z $(git status --porcelain) ]] || die "the working tree has changes that are not committed"
   python3 tests/check_docs.py . >&2 || die "the documents or the versions in them do not hold"
@@ -130,6 +129,7 @@ cmd_release() {
     command -v gpg >/dev/null || need gnupg
     gpg --batch --list-secret-keys "$FBVINS_RELEASE_KEY" >/dev/null 2>&1 || die "FBVINS_RELEASE_KEY: GnuPG has no secret key $FBVINS_RELEASE_KEY" 2
   fi
+  grep -q "^## \[$version\] - [0-9]" CHANGELOG.md || die "CHANGELOG.md has no section [$version] with a date"
   if [[ $(uname -m) == x86_64 ]]; then
     for python in "${WHEEL_PYTHONS[@]}"; do has_headers "python$python" || lacking+=("$python"); done
     ((!${#lacking[@]})) || say "no Python ${lacking[*]} with its headers here: there will be no wheels for it"
