@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/orb_locator.hpp"
 
+#include <algorithm>
+
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -33,10 +35,11 @@ void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImage
   motion_px_.clear();
   for (OrbTrack& track : tracks) {
     if (!track.was_observed) continue;
-    const OrbPatches& patches = tracks.patches(track);
+    OrbPatches& patches = tracks.patches(track);
     std::optional<Vec2> px = follow_by_alignment(track, patches, images.left());
     if (px && !returns(track, *px, images)) px.reset();
-    if (!set_observed_at(px, track, view)) ++stats.lost_flow;
+    if (set_observed_at(px, track, view)) keep_patch(track, patches);
+    else ++stats.lost_flow;
   }
   stats.median_motion_px = median(motion_px_);
 }
@@ -54,7 +57,9 @@ void OrbLocator::locate(OrbTracks& tracks, OrbView& view, const FrameImages& ima
     }
     const auto px = place(track, tracks.patches(track), keypoint, images);
     if (!px) ++stats.lost_check;
-    if (set_observed_at(px, track, view)) take_over(track, view, k);
+    if (!set_observed_at(px, track, view)) continue;
+    take_over(track, view, k);
+    if (track.was_observed) keep_patch(track, tracks.patches(track));
   }
   stats.median_motion_px = median(motion_px_);
 }
@@ -93,6 +98,12 @@ std::optional<Vec2> OrbLocator::hold_to_reference(OrbTrack& track, const OrbPatc
   if (track.renew_reference) return newest_px;
   if ((fine.px - newest_px).norm() > kMaxCreep_px) return std::nullopt;
   return fine.px;
+}
+
+/// What the check below has cut is the finest of the track's newest patch.
+void OrbLocator::keep_patch(OrbTrack& track, OrbPatches& patches) const {
+  track.newest_levels = kNearLevel + 1;
+  std::copy_n(back_.levels.begin(), track.newest_levels, patches.newest.levels.begin());
 }
 
 /// The forward-backward check: the patch found now, followed into the image before, leads to the track's position there.

@@ -32,11 +32,12 @@ class OrbLocator {
   std::optional<Vec2> refine_match(OrbTrack& track, const OrbPatches& patches, const Keypoint& keypoint, const Pyramid& left);
   std::optional<Vec2> follow_by_alignment(OrbTrack& track, const OrbPatches& patches, const Pyramid& left);
   std::optional<Vec2> hold_to_reference(OrbTrack& track, const OrbPatches& patches, const Vec2& newest_px, const Pyramid& left);
+  void keep_patch(OrbTrack& track, OrbPatches& patches) const;
   bool returns(const OrbTrack& track, const Vec2& px, const FrameImages& images);
 
   Camera camera_;
   PatchRefiner refiner_;
-  KltTemplate back_;  // patch found now, to be followed back
+  KltTemplate back_;  // patch found now, to be followed back; of the last track for which returns() was called
   std::vector<double> motion_px_;
 };
 

@@ -2,6 +2,7 @@
 #include "fbvins/frontend/orb_track.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace fbvins {
 namespace {
@@ -88,7 +89,9 @@ void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera) {
   for (OrbTrack& track : tracks) {
     if (!track.observed) continue;
     OrbPatches& patches = tracks.patches(track);
-    if (!patches.newest.cut(left, track.px, 0, kOrbAlignmentLevels - 1)) track.status = TrackStatus::lost;
+    const int first = std::exchange(track.newest_levels, 0);
+    const bool cut = patches.newest.cut(left, track.px, first, kOrbAlignmentLevels - 1);
+    if (first == 0 && !cut) track.status = TrackStatus::lost;
     else if (track.renew_reference) patches.reference.take(left, track.px, camera, track.normalised);
     track.renew_reference = false;
   }
