@@ -52,7 +52,7 @@ target_compile_options(fbvins_flags INTERFACE
   $<$<BOOL:${FBVINS_WERROR}>:-Werror>
   # These depend on what GCC inlines, and are false in std::string and std::optional (its bugs 105651 and 80635). Clang's warnings
   # and the sanitizers look for the same mistakes.
-  "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-maybe-uninitialized;-Wno-restrict;-Wno-stringop-overflow>")
+  "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-maybe-uninitialized;-Wno-restrict;-Wno-stringop-overflow;-Wno-stringop-overread>")
 
 include(cmake/FbvinsPrecompiled.cmake)
 include(cmake/FbvinsEigen.cmake)
