@@ -100,7 +100,7 @@ std::optional<Vec2> OrbLocator::hold_to_reference(OrbTrack& track, const OrbPatc
   return fine.px;
 }
 
-/// What the check below has cut is the finest of the track's newest patch.
+/// The levels that returns() has cut are the finest ones of the track's newest patch.
 void OrbLocator::keep_patch(OrbTrack& track, OrbPatches& patches) const {
   track.newest_levels = kNearLevel + 1;
   std::copy_n(back_.levels.begin(), track.newest_levels, patches.newest.levels.begin());

@@ -39,7 +39,7 @@ struct OrbTrack : TrackState {
   int level = 0;          ///< of the scale pyramid, as last seen
   Time last_seen;
   bool was_observed = false;                ///< in the image before
-  int newest_levels = 0;                    ///< so many of the finest of its newest patch are of this image already
+  int newest_levels = 0;                    ///< number of the newest patch's finest levels that are cut from this image already
   bool renew_reference = false;             ///< it no longer matches the patch with which it began
   std::array<PastPosition, kHistory> seen;  ///< of image i at i % kHistory
   std::optional<Vec3> seen_from_G;          ///< position of the camera when it was last observed, m
