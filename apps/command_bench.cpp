@@ -12,6 +12,7 @@
 #include "apps/progress.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/core/atomic_file.hpp"
+#include "fbvins/core/machine.hpp"
 #include "fbvins/experiment/bench_runner.hpp"
 #include "fbvins/experiment/bench_tables.hpp"
 #include "fbvins/report/report.hpp"

@@ -26,6 +26,7 @@ examples:
   fbvins convert flight.bag flight                           a bag with camera_info and /tf_static, as EuRoC folder
   fbvins convert MH_01_easy.bag mh01 --calibration camchain-imucam.yaml
   fbvins convert MH_01_easy mh01.mcap
+  fbvins convert flight part.mcap --start 12 --duration 10 --half
   fbvins convert MH_01_easy mh01 --rosbag2 --rename /camera/left=/cam0/image_raw,/camera/right=/cam1/image_raw,/imu=/imu0
 )";
 
@@ -87,6 +88,7 @@ void add_convert_command(CLI::App& program, int& exit_code) {
   command->add_flag("--rosbag2", arguments->target.rosbag2, "a folder with metadata.yaml that `ros2 bag` plays");
   command->add_option("--rename", arguments->renamed, "topics that get another name, OLD=NEW (a bag, a record, --rosbag2)")
       ->delimiter(',');
+  command->add_flag("--half", arguments->target.half, "images of half the width and height, lenses to match");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = convert(*arguments); });
 }

@@ -48,12 +48,13 @@ int hand_over(const HandedOver& command, char** argv) {
                           command.command, program, std::generic_category().message(errno)));
 }
 
+std::string about_this_build() { return fmt::format("fbvins {}\n{}", FBVINS_VERSION, kBuildInfo); }
+
 int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,
                      std::initializer_list<HandedOver> elsewhere) {
   keep_standard_streams();
   CLI::App program{"FB-VINS: stereo visual-inertial odometry", "fbvins"};
-  program.set_version_flag("--version", fmt::format("fbvins {}\n{}", FBVINS_VERSION, kBuildInfo),
-                           "version, commit, compiler and features");
+  program.set_version_flag("--version", about_this_build(), "version, commit, compiler and features");
   program.footer(kExamples);
   program.require_subcommand(1);
   int exit_code = kOk;

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <initializer_list>
+#include <string>
 
 #include "apps/commands.hpp"
 
@@ -25,6 +26,9 @@ std::filesystem::path program_folder();
 
 /// Replaces this process by the program that has the command; returns, with an error, only if that cannot be started.
 int hand_over(const HandedOver& command, char** argv);
+
+/// Version, commit, compiler and features: the text of --version.
+std::string about_this_build();
 
 /// The main() of each program: parses, runs the command, returns the exit code.
 int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,

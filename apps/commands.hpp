@@ -26,6 +26,7 @@ inline constexpr const char* kViewDescription = "show a finished flight in the b
 inline constexpr const char* kEvalDescription = "compute the errors of a trajectory against the ground truth";
 inline constexpr const char* kInfoDescription = "show what is in a recording: rates, gaps, calibration, stamps";
 inline constexpr const char* kDoctorDescription = "find what is wrong with a setup: units, axes, clocks, calibration, images";
+inline constexpr const char* kBugReportDescription = "gather what helps to find a mistake: versions, options, health, findings";
 inline constexpr const char* kMapDescription = "inspect, merge, cut, align, compare and export maps that `run --save-map` wrote";
 inline constexpr const char* kPx4Description = "parameters of PX4 for vision: a file to load, and a check";
 inline constexpr const char* kRecordDescription = "repair flight records";
@@ -44,6 +45,7 @@ void add_run_command(CLI::App& program, int& exit_code);
 void add_eval_command(CLI::App& program, int& exit_code);
 void add_info_command(CLI::App& program, int& exit_code);
 void add_doctor_command(CLI::App& program, int& exit_code);
+void add_bug_report_command(CLI::App& program, int& exit_code);
 void add_convert_command(CLI::App& program, int& exit_code);
 void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 
+#include "apps/half_images.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/io/euroc_folder.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -92,23 +93,23 @@ class InBetween {
   std::size_t next_ = 0;
 };
 
-Result<Sink> make_sink(const ConvertTarget& target, const Dataset& data) {
+Result<Sink> make_sink(const ConvertTarget& target, const StereoRig& rig, const Dataset& data) {
   const std::string& out = target.path;
   if (std::filesystem::exists(out)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", out)};
   if (out.ends_with(".bag")) {
-    auto bag = Ros1BagWriter::create(out, data.rig(), data.frames().front().t, target.names);
+    auto bag = Ros1BagWriter::create(out, rig, data.frames().front().t, target.names);
     if (!bag) return bag.error();
     return sink_of(std::make_shared<Ros1BagWriter>(*std::move(bag)));
   }
   if (out.ends_with(".mcap")) {
-    auto record = FlightRecord::create(out, data.rig());
+    auto record = FlightRecord::create(out, rig);
     if (!record) return record.error();
     return sink_of(std::make_shared<RecordOfInputs>(RecordOfInputs{*std::move(record)}));
   }
-  auto folder = EurocFolder::create(out, data.rig(), "converted by fbvins");
+  auto folder = EurocFolder::create(out, rig, "converted by fbvins");
   if (!folder) return folder.error();
   return sink_of(std::make_shared<EurocSink>(
-      EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}, Duration::from_seconds(data.rig().time_offset_s), {}}));
+      EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}, Duration::from_seconds(rig.time_offset_s), {}}));
 }
 
 /// An image's camera_info goes with it, and lies where ROS's programs look for it.
@@ -138,7 +139,9 @@ Result<int> copy_record(Dataset& data, const ConvertedRecord& record, const Conv
 
 Result<int> write_events(Dataset& data, const ConvertedRecord& record, const ConvertTarget& target,
                          const std::function<void(int frames)>& on_frame) {
-  Result<Sink> sink = make_sink(target, data);
+  Result<StereoRig> rig = target.half ? with_half_images(data.rig()) : data.rig();
+  if (!rig) return rig.error();
+  Result<Sink> sink = make_sink(target, *rig, data);
   if (!sink) return sink.error();
   int frames = 0;
   const Trajectory<W> odometry = record.path.empty() ? Trajectory<W>{} : recorded_odometry(record.path);
@@ -151,8 +154,10 @@ Result<int> write_events(Dataset& data, const ConvertedRecord& record, const Con
   while (auto event = data.next()) {
     const Time t = stamp_of(*event);
     if (Result<void> taken = add_until(t); !taken) return taken.error();
+    StereoFrame* frame = std::get_if<StereoFrame>(&*event);
+    if (frame != nullptr && target.half) *frame = with_half_images(std::move(*frame));
     if (Result<void> taken = sink->add(*event); !taken) return taken.error();
-    if (std::holds_alternative<StereoFrame>(*event)) on_frame(++frames);
+    if (frame != nullptr) on_frame(++frames);
   }
   constexpr Time kEnd{std::numeric_limits<std::int64_t>::max()};
   if (Result<void> taken = record.whole ? add_until(kEnd) : truth.add_until(kEnd); !taken) return taken.error();
@@ -169,14 +174,14 @@ Result<int> convert_recording(Dataset& data, const ConvertedRecord& record, cons
   const bool mcap = target.path.ends_with(".mcap");
   if (!target.rosbag2 && !mcap && !target.path.ends_with(".bag") && !target.names.empty())
     return Error{ErrorCode::invalid_argument, "an EuRoC folder has no topics that could get other names"};
-  if (!record.path.empty() && (mcap || target.rosbag2)) return copy_record(data, record, target, on_frame);
+  if (!record.path.empty() && !target.half && (mcap || target.rosbag2)) return copy_record(data, record, target, on_frame);
   if (!target.rosbag2 && (!mcap || target.names.empty())) return write_events(data, record, target, on_frame);
   // As a record first, which is then written again with other names, or beside its metadata.
   std::string as_record = target.path;
   while (as_record.size() > 1 && as_record.ends_with('/')) as_record.pop_back();
   if (std::filesystem::exists(as_record)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", target.path)};
   as_record += ".part.mcap";
-  const auto frames = write_events(data, record, {as_record}, on_frame);
+  const auto frames = write_events(data, record, {.path = as_record, .half = target.half}, on_frame);
   Result<RecoveredMcap> done = RecoveredMcap{};
   if (frames) {
     const McapPart part{.names = target.names};

@@ -22,6 +22,7 @@ struct ConvertTarget {
   std::string path;
   bool rosbag2 = false;                           ///< a folder that `ros2 bag` plays
   std::map<std::string, std::string> names = {};  ///< topics that get another name
+  bool half = false;                              ///< images of half the width and height; no outputs of a record
 };
 
 /// The number of stereo frames. A record written as a record is copied message by message, outputs included; in a bag its poses

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
                               {"view", kViewDescription, "fbvins-live"},
                               {"eval", kEvalDescription, "fbvins-tools"},
                               {"doctor", kDoctorDescription, "fbvins-tools"},
+                              {"bug-report", kBugReportDescription, kBags},
                               {"info", kInfoDescription, "fbvins-tools"},
                               {"map", kMapDescription, "fbvins-tools"},
                               {"mocap", kMocapDescription, "fbvins-tools"},

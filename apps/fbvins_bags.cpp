@@ -4,6 +4,7 @@
 
 int main(int argc, char** argv) {
   using namespace fbvins::app;
-  return run_command_line(argc, argv,
-                          {add_run_command, add_doctor_command, add_eval_command, add_info_command, add_convert_command});
+  return run_command_line(
+      argc, argv,
+      {add_run_command, add_doctor_command, add_eval_command, add_info_command, add_convert_command, add_bug_report_command});
 }

@@ -33,6 +33,8 @@ struct RecordingArguments {
   double pair_tolerance_ms = DatasetOptions{}.pair_tolerance_ms;
 
   void add_to(CLI::App& command);
+  /// All but the recording itself.
+  void add_options_to(CLI::App& command);
 };
 
 Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options);

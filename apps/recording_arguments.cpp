@@ -11,6 +11,10 @@ namespace fbvins::app {
 
 void RecordingArguments::add_to(CLI::App& command) {
   command.add_option("DATASET", path, "EuRoC folder or zip, flight record, ROS bag, MCAP file, or TUM-VI folder")->required();
+  add_options_to(command);
+}
+
+void RecordingArguments::add_options_to(CLI::App& command) {
   command.add_option(
       "--calibration", calibration,
       "calibration file instead of the recording's own: of Kalibr, OpenVINS, Basalt or VINS-Fusion, or an EuRoC folder");

@@ -63,7 +63,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\ncommit: .+\ncompiler: .+\nfeatures: .*\n$")
-        for command in ([], ["run"], ["calibrate"], ["target"], ["simulate", "board"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"], ["view"], ["map"], ["record"], ["px4"]):
+        for command in ([], ["run"], ["calibrate"], ["target"], ["simulate", "board"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"], ["view"], ["map"], ["record"], ["px4"], ["convert"], ["bug-report"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("examples:", done.stdout)

@@ -2,14 +2,12 @@
 #include "fbvins/experiment/bench_results.hpp"
 
 #include <fmt/format.h>
-#include <sys/utsname.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
 #include <set>
-#include <thread>
 
+#include "fbvins/core/machine.hpp"
 #include "fbvins/core/text.hpp"
 #include "fbvins/experiment/bench_runner.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -151,22 +149,6 @@ Json results_json(const std::string& title, const std::vector<CellResult>& resul
   json["versions"] = versions;
   json["cells"] = std::move(cells);
   return json;
-}
-
-std::string describe_machine() {
-  std::string processor = "unknown processor";
-  std::ifstream cpuinfo("/proc/cpuinfo");
-  for (std::string line; std::getline(cpuinfo, line);)
-    if (line.starts_with("model name")) {
-      processor = std::string(trim(std::string_view(line).substr(line.find(':') + 1)));
-      break;
-    }
-  utsname system{};
-  uname(&system);
-  const double gigabytes =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE)) / (1024.0 * 1024 * 1024);
-  return fmt::format("{}, {} cores, {:.0f} GB, {} {} {}", processor, std::thread::hardware_concurrency(), gigabytes,
-                     system.sysname, system.release, system.machine);
 }
 
 Result<std::map<std::string, Reference>> read_reference(const std::string& path) {

@@ -37,9 +37,6 @@ std::string results_csv(const std::vector<CellResult>& results);
 /// With the machine, the program's version and each cell's effective configuration.
 nlohmann::ordered_json results_json(const std::string& title, const std::vector<CellResult>& results);
 
-/// The machine in one line: processor, cores, memory, system.
-std::string describe_machine();
-
 struct Tolerance {
   double share = 0.2;      ///< relative increase of an error that is tolerated
   double floor_m = 0.002;  ///< absolute increase that is tolerated in addition
