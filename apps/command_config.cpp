@@ -18,6 +18,7 @@ constexpr const char* kExamples = R"(examples:
   fbvins config                                  the options for users with unit, range, value and meaning
   fbvins config --all                            those for experts as well
   fbvins config --yaml > drone.yaml              a file to start from
+  fbvins config --profile a55 --yaml             what a profile sets
   fbvins config --config drone.yaml --set estimator.max_iterations=8
 )";
 

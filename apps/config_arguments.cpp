@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/config_arguments.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
 #include "fbvins/frontend/frontend_options.hpp"
@@ -23,6 +25,14 @@ CLI::Validator name_of_frontend() {
 }  // namespace
 
 void ConfigArguments::add_to(CLI::App& command) {
+  std::vector<std::string> names;
+  std::string meanings;
+  for (const Profile& one : profiles()) {
+    names.emplace_back(one.name);
+    meanings += fmt::format("; {}: {}", one.name, one.meaning);
+  }
+  command.add_option("--profile", profile, "options for a kind of computer, before those of --config" + meanings)
+      ->check(CLI::IsMember(names));
   command.add_option("--config", file, "YAML file that changes the defaults (see fbvins config)");
   command.add_option("--set", assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
   // Before --frontend, to whose names it adds.
@@ -37,7 +47,7 @@ void ConfigArguments::add_to(CLI::App& command) {
 Result<Config> ConfigArguments::load() const {
   std::vector<std::string> all = assignments;
   if (!frontend.empty()) all.insert(all.begin(), "frontend.kind=" + frontend);
-  return load_config(file, all);
+  return load_config(file, all, profile);
 }
 
 }  // namespace fbvins::app

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arguments of commands that configure the odometry: --config, --frontend, --set.
+// The arguments of commands that configure the odometry: --profile, --config, --frontend, --set.
 #pragma once
 
 #include <string>
@@ -14,11 +14,11 @@ class App;
 namespace fbvins::app {
 
 struct ConfigArguments {
-  std::string file, frontend;
+  std::string file, frontend, profile;
   std::vector<std::string> assignments;
 
   void add_to(CLI::App& command);
-  /// The file's options, overridden by the frontend, then by the assignments.
+  /// The profile's options, overridden by the file, by the frontend, then by the assignments.
   Result<Config> load() const;
 };
 

@@ -53,6 +53,17 @@ TEST(ConfigFile, AssignmentsComeAfterTheFileAndInOrder) {
   EXPECT_FALSE(load_config("no/such/file.yaml"));
 }
 
+TEST(ConfigFile, AProfileComesBeforeTheFileAndTheAssignments) {
+  for (const Profile& profile : profiles()) {
+    const auto config = load_config("", {"estimator.max_iterations=9"}, profile.name);
+    ASSERT_TRUE(config) << config.error().message;
+    EXPECT_EQ(config->estimator.max_iterations, 9);
+    EXPECT_NE(to_yaml(*load_config("", {}, profile.name)), to_yaml(Config{}));
+  }
+  EXPECT_EQ(load_config("", {}, "a55")->frontend.kind, "klt");
+  EXPECT_FALSE(load_config("", {}, "z80"));
+}
+
 TEST(ConfigFile, AFlightRecordGivesTheFlightsConfiguration) {
   const std::string path = ::testing::TempDir() + "/fbvins_config_" + std::to_string(getpid()) + ".mcap";
   Config flown;
