@@ -82,9 +82,9 @@ struct FrontendStats {
   /// predicted.
   double median_motion_px = 0;
   double pyramid_ms = 0, track_ms = 0, stereo_ms = 0, detect_ms = 0, geometry_ms = 0;
-  DescriptorMatchCounts matches;      ///< over time, by the descriptors in use
-  DescriptorMatchCounts raw_matches;  ///< what the descriptors would have found before they were improved
-  double boost_ms = 0;                ///< improving descriptors of both images; part of detect_ms and stereo_ms
+  DescriptorMatchCounts matches;      ///< over time, by the descriptors in use, of tracks that alignment has lost
+  DescriptorMatchCounts raw_matches;  ///< what they would have found as extracted
+  double boost_ms = 0;                ///< improving descriptors; part of detect_ms and track_ms
   double total_ms() const { return pyramid_ms + track_ms + stereo_ms + detect_ms + geometry_ms; }
 };
 

@@ -10,10 +10,17 @@
 namespace fbvins {
 namespace {
 
+/// In an array: GCC 12 compares the lanes of a vector wider than a register one by one.
+FBVINS_INLINE void at_least(float lowest, F16& x) {
+  float lanes[kLanes];
+  store_lanes(x, lanes);
+  for (float& lane : lanes) lane = lane < lowest ? lowest : lane;
+  load_lanes(lanes, x);
+}
+
 /// e^x for x <= 0 to about 2e-7 of its value; below -87 the smallest normal number or so.
 FBVINS_INLINE void exp_of_negative(F16& x) {
-  const F16 lowest = F16{} - 87.0f;
-  x = x < lowest ? lowest : x;
+  at_least(-87.0f, x);
   constexpr float kRounder = 12582912.0f;
   const F16 whole = (x * 1.44269504f + kRounder) - kRounder;
   const F16 r = (x - whole * 0.693359375f) + whole * 2.12194440e-4f;  // ln 2 in two parts
@@ -115,20 +122,28 @@ void gate(const float* query, const float* summary, int rows, int width, float* 
       load_lanes(query + static_cast<std::ptrdiff_t>(row) * width + c, q);
       load_lanes(summary + c, s);
       // exp of minus the magnitude cannot overflow
-      F16 e = q > 0.0f ? -q : q;
+      float of[kLanes], lanes[kLanes];
+      store_lanes(q, of);
+      for (int l = 0; l < kLanes; ++l) lanes[l] = of[l] > 0 ? -of[l] : of[l];
+      F16 e;
+      load_lanes(lanes, e);
       exp_of_negative(e);
-      const F16 larger = 1.0f / (1.0f + e);
-      store_lanes((q > 0.0f ? larger : 1.0f - larger) * s, out + static_cast<std::ptrdiff_t>(row) * width + c);
+      const F16 larger = 1.0f / (1.0f + e), smaller = 1.0f - larger;
+      float either[2][kLanes];
+      store_lanes(larger, either[0]);
+      store_lanes(smaller, either[1]);
+      for (int l = 0; l < kLanes; ++l) lanes[l] = of[l] > 0 ? either[0][l] : either[1][l];
+      F16 share;
+      load_lanes(lanes, share);
+      store_lanes(share * s, out + static_cast<std::ptrdiff_t>(row) * width + c);
     }
 }
 
 FBVINS_KERNEL
 void take_signs(const float* y, std::uint64_t* out) {
-  for (int word = 0; word < 4; ++word) {
-    std::uint64_t signs = 0;
-    for (int i = 0; i < 64; ++i) signs |= static_cast<std::uint64_t>(y[64 * word + i] > 0) << i;
-    out[word] = signs;
-  }
+  std::uint8_t positive[256];
+  for (int i = 0; i < 256; ++i) positive[i] = y[i] > 0;
+  pack_flags(positive, out);
 }
 
 }  // namespace fbvins

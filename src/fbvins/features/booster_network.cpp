@@ -16,20 +16,26 @@ double log_score(const Keypoint& k) { return std::log1p(std::max(double{k.score}
 
 }  // namespace
 
+double mean_log_score(std::span<const Keypoint> keypoints) {
+  double sum = 0;
+  for (const Keypoint& k : keypoints) sum += log_score(k);
+  return sum / static_cast<double>(std::max<std::size_t>(keypoints.size(), 1));
+}
+
+void booster_geometry(int width, int height, const Keypoint& k, double mean, float* out) {
+  const double half = 0.5 * std::max(width, height);
+  // In double precision, then rounded: the libraries of two machines differ in the last digit only.
+  for (const double v :
+       {(k.pixel.x() - 0.5 * width) / half, (k.pixel.y() - 0.5 * height) / half, (log_score(k) - mean) * 0.5, mean * 0.1,
+        std::cos(double{k.angle_rad}), std::sin(double{k.angle_rad}), 2 * std::log(std::max(double{k.scale}, 1.0))})
+    *out++ = static_cast<float>(v);
+}
+
 void booster_geometry(int width, int height, std::span<const Keypoint> keypoints, std::vector<float>& out) {
   out.resize(keypoints.size() * kBoosterGeometry);
-  const double half = 0.5 * std::max(width, height);
-  double mean = 0;
-  for (const Keypoint& k : keypoints) mean += log_score(k);
-  mean /= static_cast<double>(std::max<std::size_t>(keypoints.size(), 1));
-  float* g = out.data();
-  for (const Keypoint& k : keypoints) {
-    // In double precision, then rounded: the libraries of two machines differ in the last digit only.
-    for (const double v :
-         {(k.pixel.x() - 0.5 * width) / half, (k.pixel.y() - 0.5 * height) / half, (log_score(k) - mean) * 0.5, mean * 0.1,
-          std::cos(double{k.angle_rad}), std::sin(double{k.angle_rad}), 2 * std::log(std::max(double{k.scale}, 1.0))})
-      *g++ = static_cast<float>(v);
-  }
+  const double mean = mean_log_score(keypoints);
+  for (std::size_t i = 0; i < keypoints.size(); ++i)
+    booster_geometry(width, height, keypoints[i], mean, out.data() + i * kBoosterGeometry);
 }
 
 BoosterNetwork::BoosterNetwork(const BoosterWeights& weights, BoosterPrecision precision, Int8Kernel kernel)
@@ -82,31 +88,69 @@ void BoosterNetwork::run(int width, int height, std::span<const Keypoint> keypoi
   y_.clear();
   if (rows_ == 0) return;
   booster_geometry(width, height, keypoints.first(static_cast<std::size_t>(rows_)), geometry_);
-  encode(margins);
+  encode(margins, true);
   encode_geometry();
+  summaries_.resize(static_cast<std::size_t>(width_));
   for (const Layer& layer : layers_) {
-    attend(layer);
+    summarise(layer, summaries_.data());
+    attend(layer, summaries_.data(), true);
     feed_forward(layer);
   }
+  finish(descriptors);
+}
+
+void BoosterNetwork::summarise(std::span<const float> geometry, std::span<const Margins> margins, std::vector<float>& summaries) {
+  rows_ = static_cast<int>(margins.size());
+  summaries.assign(layers_.size() * static_cast<std::size_t>(width_), 0.0f);
+  if (rows_ == 0) return;
+  geometry_.assign(geometry.begin(), geometry.end());
+  encode(margins, false);
+  encode_geometry();
+  for (std::size_t l = 0; l < layers_.size(); ++l) {
+    float* summary = summaries.data() + l * static_cast<std::size_t>(width_);
+    summarise(layers_[l], summary);
+    if (l + 1 == layers_.size()) break;
+    attend(layers_[l], summary, true);
+    feed_forward(layers_[l]);
+  }
+}
+
+void BoosterNetwork::run(std::span<const float> geometry, std::span<const Margins> margins, const std::vector<float>& summaries,
+                         std::span<Descriptor> descriptors) {
+  rows_ = static_cast<int>(margins.size());
+  y_.clear();
+  if (rows_ == 0) return;
+  geometry_.assign(geometry.begin(), geometry.end());
+  encode(margins, true);
+  encode_geometry();
+  for (std::size_t l = 0; l < layers_.size(); ++l) {
+    attend(layers_[l], summaries.data() + l * static_cast<std::size_t>(width_), false);
+    feed_forward(layers_[l]);
+  }
+  finish(descriptors);
+}
+
+void BoosterNetwork::finish(std::span<Descriptor> descriptors) {
   apply(head_, z_, y_);
   if (skip_.outputs > 0) add(y_.data(), skipped_.data(), rows_ * skip_.outputs);
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) take_signs(y_.data() + 256 * i, descriptors[i].bits.data());
 }
 
 /// The input through two layers into z (eq. 6, the descriptor's part), and through the skip connection past all layers.
-void BoosterNetwork::encode(std::span<const Margins> margins) {
+void BoosterNetwork::encode(std::span<const Margins> margins, bool with_skip) {
+  with_skip = with_skip && skip_.outputs > 0;
   const auto* values = reinterpret_cast<const std::int8_t*>(margins.data());
   if (descriptor1_.whole_numbers) {
     margins_ ? quantised_.set_values(values, rows_, kMarginsPerFeature, kMarginUnit)
              : quantised_.set_signs(values, rows_, 256, kMarginsPerFeature);
-    if (skip_.outputs > 0) apply(skip_, hidden_, skipped_, true);
+    if (with_skip) apply(skip_, hidden_, skipped_, true);
     apply(descriptor1_, hidden_, hidden_, true);
   } else {
     query_.clear();
     for (int i = 0; i < rows_; ++i, values += kMarginsPerFeature)
       for (int k = 0; k < descriptor1_.inputs; ++k)
         query_.push_back(margins_ ? kMarginUnit * static_cast<float>(values[k]) : (values[k] > 0 ? 1.0f : -1.0f));
-    if (skip_.outputs > 0) apply(skip_, query_, skipped_);
+    if (with_skip) apply(skip_, query_, skipped_);
     apply(descriptor1_, query_, hidden_);
   }
   relu(hidden_.data(), rows_ * descriptor1_.outputs);
@@ -124,15 +168,19 @@ void BoosterNetwork::encode_geometry() {
   add(z_.data(), hidden_.data(), rows_ * width_);
 }
 
-/// z = norm(z + out(sigmoid(query) * summary of all keypoints)) (eq. 7-8).
-void BoosterNetwork::attend(const Layer& layer) {
-  apply(layer.query, z_, query_);
-  apply(layer.key, z_, key_, true);
+/// Of all rows (eq. 7-8).
+void BoosterNetwork::summarise(const Layer& layer, float* summary) {
+  apply(layer.key, z_, key_);
   apply(layer.value, z_, value_, true);
-  summary_.resize(static_cast<std::size_t>(width_));
   scratch_.resize(2 * static_cast<std::size_t>(width_));
-  summarise(key_.data(), value_.data(), rows_, width_, summary_.data(), scratch_.data());
-  gate(query_.data(), summary_.data(), rows_, width_, value_.data());
+  fbvins::summarise(key_.data(), value_.data(), rows_, width_, summary, scratch_.data());
+}
+
+/// z = norm(z + out(sigmoid(query) * summary)). `again`: z was the last input.
+void BoosterNetwork::attend(const Layer& layer, const float* summary, bool again) {
+  apply(layer.query, z_, query_, again);
+  value_.resize(query_.size());
+  gate(query_.data(), summary, rows_, width_, value_.data());
   apply(layer.out, value_, query_);
   add(z_.data(), query_.data(), rows_ * width_);
   normalise_rows(z_.data(), rows_, width_, layer.norm1.weight.data(), layer.norm1.bias.data());

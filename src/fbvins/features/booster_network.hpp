@@ -20,6 +20,10 @@ namespace fbvins {
 /// Geometry of keypoints as the network's input, kBoosterGeometry numbers each: position relative to the image's centre,
 /// logarithm of the score relative to the image's mean and that mean, cosine and sine of the angle, logarithm of the scale.
 void booster_geometry(int width, int height, std::span<const Keypoint> keypoints, std::vector<float>& out);
+/// The same of one keypoint, to out[kBoosterGeometry]; the mean is that of its image.
+void booster_geometry(int width, int height, const Keypoint& keypoint, double mean_log_score, float* out);
+/// Mean of the logarithms of one plus the score.
+double mean_log_score(std::span<const Keypoint> keypoints);
 
 class BoosterNetwork {
  public:
@@ -27,6 +31,13 @@ class BoosterNetwork {
 
   /// Writes the descriptors; keypoints, margins and descriptors are of one image of width x height px, one to one.
   void run(int width, int height, std::span<const Keypoint> keypoints, std::span<const Margins> margins,
+           std::span<Descriptor> descriptors);
+
+  /// The layers' summaries (eq. 7-8) of these keypoints, for run() of others of the image. `geometry`: kBoosterGeometry numbers
+  /// each.
+  void summarise(std::span<const float> geometry, std::span<const Margins> margins, std::vector<float>& summaries);
+  /// Writes the descriptors of some keypoints, with summaries of others.
+  void run(std::span<const float> geometry, std::span<const Margins> margins, const std::vector<float>& summaries,
            std::span<Descriptor> descriptors);
 
   /// Numbers whose signs are the bits of the last run: 256 a keypoint.
@@ -48,10 +59,12 @@ class BoosterNetwork {
   Linear prepare(const LinearWeights& weights, bool fine = false) const;
   /// out = linear(x). `again`: x is that of the previous call, so its quantised rows are used once more.
   void apply(const Linear& linear, const std::vector<float>& x, std::vector<float>& out, bool again = false);
-  void encode(std::span<const Margins> margins);
+  void encode(std::span<const Margins> margins, bool with_skip);
   void encode_geometry();
-  void attend(const Layer& layer);
+  void summarise(const Layer& layer, float* summary);
+  void attend(const Layer& layer, const float* summary, bool again);
   void feed_forward(const Layer& layer);
+  void finish(std::span<Descriptor> descriptors);
 
   BoosterPrecision precision_;
   Int8Kernel kernel_;
@@ -63,7 +76,7 @@ class BoosterNetwork {
   // buffers
   int rows_ = 0;
   QuantisedRows quantised_, rest_;
-  std::vector<float> geometry_, z_, hidden_, hidden2_, query_, key_, value_, summary_, scratch_, skipped_, y_;
+  std::vector<float> geometry_, z_, hidden_, hidden2_, query_, key_, value_, summaries_, scratch_, skipped_, y_;
 };
 
 }  // namespace fbvins

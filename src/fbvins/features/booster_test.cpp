@@ -132,6 +132,32 @@ TEST_P(ShippedWeights, GiveTheSameBitsWithEveryKernelAndEveryTime) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedWeights, testing::Values("boost-s"), [](const auto& p) { return p.param.substr(6); });
 
+/// With a summary of all keypoints some are improved to the very bits that all together are; the stage's sample of them changes
+/// few.
+TEST_P(ShippedWeights, ImproveSomeKeypointsAsAllTogether) {
+  const auto weights = load_booster_weights(booster_weights_path(GetParam()));
+  ASSERT_TRUE(weights) << weights.error().message;
+  OrbFeatures all = features_of_an_image();
+  BoosterNetwork network(*weights, BoosterPrecision::int8, best_int8_kernel());
+  std::vector<float> geometry, summaries;
+  booster_geometry(376, 240, all.keypoints, geometry);
+  network.summarise(geometry, all.margins, summaries);
+  std::vector<DescriptorInput> inputs;
+  std::vector<Descriptor> some(all.descriptors.begin() + 30, all.descriptors.begin() + 37), sampled = some;
+  for (std::size_t k = 30; k < 37; ++k) inputs.push_back({all.margins[k], all.keypoints[k], mean_log_score(all.keypoints)});
+  network.run(std::span(geometry).subspan(30 * kBoosterGeometry, 7 * kBoosterGeometry), std::span(all.margins).subspan(30, 7),
+              summaries, some);
+  auto stage = make_booster_stage({.weights = GetParam()});
+  ASSERT_TRUE(stage) << stage.error().message;
+  ImageContext context;
+  (*stage)->look_at(376, 240, all, context);
+  (*stage)->improve(context, inputs, sampled);
+  (*stage)->improve(376, 240, all);
+  const std::vector<Descriptor> expected(all.descriptors.begin() + 30, all.descriptors.begin() + 37);
+  EXPECT_EQ(some, expected);
+  EXPECT_LT(share_of_different_bits(sampled, expected), 0.02);
+}
+
 TEST(Booster, TakesAnyNumberOfKeypoints) {
   auto stage = make_booster_stage(BoosterOptions{});
   ASSERT_TRUE(stage) << stage.error().message;

@@ -66,6 +66,14 @@ void FastCells::collect(int y) {
   keep_local_maxima(row(y + 2), row(y), row(y + 1), count_, limits_.data() + border_, left);
   for (int block = 0; block < count_; block += 8) {
     std::uint64_t eight;
+    if (block % 32 == 0) {  // most blocks are empty
+      std::uint64_t words[4];
+      std::memcpy(words, left + block, sizeof(words));
+      if ((words[0] | words[1] | words[2] | words[3]) == 0) {
+        block += 24;
+        continue;
+      }
+    }
     std::memcpy(&eight, left + block, sizeof(eight));
     while (eight != 0) {
       const int k = std::countr_zero(eight) / 8;

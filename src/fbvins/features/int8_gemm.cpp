@@ -17,16 +17,13 @@ constexpr float kRounder = 12582912.0f;
 constexpr int kColumns = 16 * kInt8BlocksTogether;
 
 FBVINS_INLINE float largest_magnitude(const float* x, int n) {
-  F16 lanes{}, v;
+  // Of float lanes in an array: GCC 12 compares those of a vector wider than a register one by one.
+  float lanes[kLanes] = {}, most = 0;
   int i = 0;
-  for (; i + kLanes <= n; i += kLanes) {
-    load_lanes(x + i, v);
-    v = v < 0.0f ? -v : v;
-    lanes = v > lanes ? v : lanes;
-  }
-  float most = 0;
+  for (; i + kLanes <= n; i += kLanes)
+    for (int l = 0; l < kLanes; ++l) lanes[l] = std::fabs(x[i + l]) > lanes[l] ? std::fabs(x[i + l]) : lanes[l];
   for (; i < n; ++i) most = std::max(most, std::fabs(x[i]));
-  for (int l = 0; l < kLanes; ++l) most = std::max(most, lanes[l]);
+  for (const float lane : lanes) most = std::max(most, lane);
   return most;
 }
 

@@ -3,6 +3,7 @@
 // Explicit lanes let a reduction vectorise without -ffast-math, with the same bits on every target.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <cstring>
 
@@ -33,6 +34,20 @@ FBVINS_INLINE float sum_lanes(const F16& v) {
   for (int half = kLanes / 2; half > 0; half /= 2)
     for (int i = 0; i < half; ++i) a[i] += a[i + half];
   return a[0];
+}
+
+/// 256 flags, each 0 or 1, as bits: the first in the lowest of the first word.
+FBVINS_INLINE void pack_flags(const std::uint8_t* flags, std::uint64_t* words) {
+  static_assert(std::endian::native == std::endian::little, "the lowest byte must be the first flag");
+  for (int word = 0; word < 4; ++word) {
+    std::uint64_t bits = 0;
+    for (int byte = 0; byte < 8; ++byte, flags += 8) {
+      std::uint64_t eight;
+      std::memcpy(&eight, flags, sizeof(eight));
+      bits |= ((eight * 0x0102040810204080) >> 56) << (8 * byte);  // flag i of the eight comes to bit 56 + i
+    }
+    words[word] = bits;
+  }
 }
 
 }  // namespace fbvins

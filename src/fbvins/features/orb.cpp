@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/features/orb_pattern.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -67,10 +69,13 @@ void OrbExtractor::take_in_rounds(int quota) {
   }
 }
 
+/// The level is smoothed around each keypoint, which costs a quarter of smoothing all of it; its half is smoothed as a whole, a
+/// quarter as large under patches as large.
 void OrbExtractor::describe(int l, OrbFeatures& out) {
+  static_assert(kSmoothPatchRadius == kPatternRadius && kSmoothPatchRadius + 3 - ScalePyramid::kBorder <= kOrbBorder);
   if (chosen_.empty()) return;
   const PyramidLevel& level = pyramid_.level(l);
-  const PyramidLevel smooth = smooth_level(level, smooth_, scratch_);
+  SmoothPatch patch;
   PyramidLevel smooth_half;
   if (with_margins_) {
     half_.build({level.origin, level.width, level.height, level.stride}, 2);
@@ -86,7 +91,8 @@ void OrbExtractor::describe(int l, OrbFeatures& out) {
     keypoint.angle_rad = static_cast<float>(std::atan2(direction.y(), direction.x()));
     keypoint.score = c.harris;
     out.keypoints.push_back(keypoint);
-    const Comparisons difference = compare(smooth, Vec2(c.x, c.y), direction);
+    const Comparisons difference =
+        compare(smooth_patch(level, c.x, c.y, patch), Vec2(kSmoothPatchRadius, kSmoothPatchRadius), direction);
     out.descriptors.push_back(bits_of(difference));
     if (!with_margins_) continue;
     Margins& margins = out.margins.emplace_back();

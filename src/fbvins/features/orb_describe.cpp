@@ -44,35 +44,44 @@ void disc_moments(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_
   *m01 = sum_y;
 }
 
+using I16x8 = std::int16_t __attribute__((vector_size(16)));
 using I32x8 = std::int32_t __attribute__((vector_size(32)));
 
-FBVINS_INLINE void load_eight(const std::uint8_t* p, I32x8& out) {
+FBVINS_INLINE void load_eight(const std::uint8_t* p, I16x8& out) {
   using U8x8 = std::uint8_t __attribute__((vector_size(8)));
   U8x8 bytes;
   std::memcpy(&bytes, p, sizeof(bytes));
-  out = __builtin_convertvector(bytes, I32x8);
+  out = __builtin_convertvector(bytes, I16x8);
 }
 
-/// Sums of squared Sobel gradients over 8x8 pixels from `corner` on, a column a lane.
+/// Sums of squared Sobel gradients over 8x8 pixels from `corner` on, a column a lane. A gradient is at most 4 * 255.
 FBVINS_KERNEL
 void gradient_sums(const std::uint8_t* corner, std::ptrdiff_t s, std::int32_t* xx, std::int32_t* xy, std::int32_t* yy) {
-  I32x8 smooth[3] = {}, slope[3] = {};  // of the last three rows: 1 2 1 and -1 0 1
+  I16x8 smooth[3] = {}, slope[3] = {};  // of the last three rows: 1 2 1 and -1 0 1
   I32x8 a{}, b{}, c{};
   for (int r = -1; r <= 8; ++r) {
     const std::uint8_t* p = corner + r * s;
-    I32x8 left, mid, right;
+    I16x8 left, mid, right;
     load_eight(p - 1, left);
     load_eight(p, mid);
     load_eight(p + 1, right);
     smooth[0] = smooth[1], smooth[1] = smooth[2], smooth[2] = left + 2 * mid + right;
     slope[0] = slope[1], slope[1] = slope[2], slope[2] = right - left;
     if (r < 1) continue;
-    const I32x8 gx = slope[0] + 2 * slope[1] + slope[2], gy = smooth[2] - smooth[0];
+    const I32x8 gx = __builtin_convertvector(slope[0] + 2 * slope[1] + slope[2], I32x8);
+    const I32x8 gy = __builtin_convertvector(smooth[2] - smooth[0], I32x8);
     a += gx * gx;
     b += gx * gy;
     c += gy * gy;
   }
   for (int i = 0; i < 8; ++i) *xx += a[i], *xy += b[i], *yy += c[i];
+}
+
+FBVINS_KERNEL
+void positive_bits(const std::int16_t* difference, std::uint64_t* words) {
+  std::uint8_t positive[256];
+  for (int i = 0; i < 256; ++i) positive[i] = difference[i] > 0;
+  pack_flags(positive, words);
 }
 
 struct PatternLanes {
@@ -147,11 +156,7 @@ Comparisons compare(const PyramidLevel& smooth, const Vec2& pixel, const Vec2& d
 
 Descriptor bits_of(const Comparisons& difference) {
   Descriptor descriptor;
-  for (std::size_t word = 0; word < 4; ++word) {
-    std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < 64; ++i) bits |= static_cast<std::uint64_t>(difference[64 * word + i] > 0) << i;
-    descriptor.bits[word] = bits;
-  }
+  positive_bits(difference.data(), descriptor.bits.data());
   return descriptor;
 }
 

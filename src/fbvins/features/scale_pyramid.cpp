@@ -60,26 +60,27 @@ void replicate_borders(std::uint8_t* origin, int width, int height, std::ptrdiff
   }
 }
 
-// Weights 4 9 12 14 12 9 4 out of 64: standard deviation 1.6 px. All sums fit into 16 bits.
-FBVINS_KERNEL
-void smooth_columns(const std::uint8_t* centre, std::ptrdiff_t s, int count, std::uint8_t* out) {
+/// `count` pixels from p on, each blended with its neighbours up to three steps away: weights 4 9 12 14 12 9 4 out of 64,
+/// standard deviation 1.6 px. All sums fit into 16 bits.
+FBVINS_INLINE void blend_seven(const std::uint8_t* __restrict p, std::ptrdiff_t step, int count, std::uint8_t* __restrict out) {
   for (int x = 0; x < count; ++x) {
-    const std::uint16_t outer = static_cast<std::uint16_t>(centre[x - 3 * s] + centre[x + 3 * s]);
-    const std::uint16_t middle = static_cast<std::uint16_t>(centre[x - 2 * s] + centre[x + 2 * s]);
-    const std::uint16_t inner = static_cast<std::uint16_t>(centre[x - s] + centre[x + s]);
-    const std::uint16_t sum = static_cast<std::uint16_t>(4 * outer + 9 * middle + 12 * inner + 14 * centre[x] + 32);
+    const std::uint16_t outer = static_cast<std::uint16_t>(p[x - 3 * step] + p[x + 3 * step]);
+    const std::uint16_t middle = static_cast<std::uint16_t>(p[x - 2 * step] + p[x + 2 * step]);
+    const std::uint16_t inner = static_cast<std::uint16_t>(p[x - step] + p[x + step]);
+    const std::uint16_t sum = static_cast<std::uint16_t>(4 * outer + 9 * middle + 12 * inner + 14 * p[x] + 32);
     out[x] = static_cast<std::uint8_t>(sum >> 6);
   }
 }
 
 FBVINS_KERNEL
-void smooth_row(const std::uint8_t* row, int count, std::uint8_t* out) {
-  for (int x = 0; x < count; ++x) {
-    const std::uint16_t outer = static_cast<std::uint16_t>(row[x - 3] + row[x + 3]);
-    const std::uint16_t middle = static_cast<std::uint16_t>(row[x - 2] + row[x + 2]);
-    const std::uint16_t inner = static_cast<std::uint16_t>(row[x - 1] + row[x + 1]);
-    const std::uint16_t sum = static_cast<std::uint16_t>(4 * outer + 9 * middle + 12 * inner + 14 * row[x] + 32);
-    out[x] = static_cast<std::uint8_t>(sum >> 6);
+void smooth_pixels(const std::uint8_t* p, std::ptrdiff_t step, int count, std::uint8_t* out) { blend_seven(p, step, count, out); }
+
+FBVINS_KERNEL
+void smooth_rows_of_patch(const std::uint8_t* centre, std::ptrdiff_t stride, std::uint8_t* out) {
+  std::uint8_t columns[3 * kLanes];  // from three pixels left of the patch on
+  for (int y = -kSmoothPatchRadius; y <= kSmoothPatchRadius; ++y, out += SmoothPatch::kStride) {
+    blend_seven(centre + y * stride - kSmoothPatchRadius - 3, stride, 3 * kLanes, columns);
+    blend_seven(columns + 3, 1, 2 * kLanes, out);
   }
 }
 
@@ -147,10 +148,15 @@ PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& 
   if (scratch.size() < pitch + 64) scratch.resize(pitch + 64);
   std::uint8_t* origin = out.data() + static_cast<std::size_t>(margin) * pitch + margin;
   for (int y = -margin; y < level.height + margin; ++y) {
-    smooth_columns(level.row(y) - side, level.stride, level.width + 2 * side, scratch.data());
-    smooth_row(scratch.data() + 3, level.width + 2 * margin, origin + y * level.stride - margin);
+    smooth_pixels(level.row(y) - side, level.stride, level.width + 2 * side, scratch.data());
+    smooth_pixels(scratch.data() + 3, 1, level.width + 2 * margin, origin + y * level.stride - margin);
   }
   return {origin, level.width, level.height, level.stride};
+}
+
+PyramidLevel smooth_patch(const PyramidLevel& level, int x, int y, SmoothPatch& out) {
+  smooth_rows_of_patch(level.row(y) + x, level.stride, out.pixels);
+  return {out.pixels, SmoothPatch::kSide, SmoothPatch::kSide, SmoothPatch::kStride};
 }
 
 }  // namespace fbvins

@@ -48,4 +48,15 @@ class ScalePyramid {
 /// `out` and `scratch` are resized as needed; the returned view points into `out`.
 PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& out, std::vector<std::uint8_t>& scratch);
 
+/// Around one pixel of a level, so much of what smooth_level() gives.
+inline constexpr int kSmoothPatchRadius = 13;
+struct SmoothPatch {
+  static constexpr int kSide = 2 * kSmoothPatchRadius + 1, kStride = 2 * kLanes;
+  std::uint8_t pixels[kSide * kStride];
+};
+
+/// A view of `out` whose pixel (kSmoothPatchRadius, kSmoothPatchRadius) is pixel (x, y) of the level, inside by
+/// kSmoothPatchRadius + 3 - kBorder px or more.
+PyramidLevel smooth_patch(const PyramidLevel& level, int x, int y, SmoothPatch& out);
+
 }  // namespace fbvins

@@ -58,5 +58,22 @@ TEST(SmoothLevel, KeepsConstantsAndTheSumOfAPoint) {
   EXPECT_EQ(smooth.row(43)[50], smooth.row(37)[50]);
 }
 
+TEST(SmoothPatch, HasThePixelsOfTheSmoothedLevel) {
+  Image image(90, 80);
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) image.at(x, y) = static_cast<std::uint8_t>((x * x + 3 * x * y + 7 * y) % 251);
+  ScalePyramid pyramid;
+  pyramid.build(image.view(), 1, 1.2);
+  std::vector<std::uint8_t> out, scratch;
+  const PyramidLevel whole = smooth_level(pyramid.level(0), out, scratch);
+  SmoothPatch pixels;
+  for (const auto& [x, y] : {std::pair{12, 12}, {77, 67}, {40, 30}}) {  // at the edges, too
+    const PyramidLevel patch = smooth_patch(pyramid.level(0), x, y, pixels);
+    for (int v = -8; v <= 8; ++v)
+      for (int u = -8; u <= 8; ++u)
+        ASSERT_EQ(patch.row(kSmoothPatchRadius + v)[kSmoothPatchRadius + u], whole.row(y + v)[x + u]) << x << ' ' << y;
+  }
+}
+
 }  // namespace scale_pyramid_test
 }  // namespace fbvins

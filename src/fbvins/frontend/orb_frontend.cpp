@@ -28,7 +28,8 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       T_C1C0_(rig.T_C1C0()),
       images_(rig, kOrbAlignmentLevels),
       predictor_(rig.T_BC0),
-      describer_(extraction(options), std::move(stage)),
+      describer_(extraction(options), stage),
+      improver_(std::move(stage)),
       tracks_(options.max_features + kMostUnobserved),
       matcher_(options.search_px),
       locator_(rig.left),
@@ -67,7 +68,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
     detected = follow(left, stats);
   } else {
     detect(left, stats);
-    recogniser_.recognise(tracks_, view_, images_.left(), stats);
+    recogniser_.recognise(tracks_, view_, images_.left(), improver_, stats);
   }
   cut_patches(tracks_, images_.left(), camera_);
   drop_ended();
@@ -82,6 +83,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   }
   out.features = features_of(tracks_, camera_, options_.sigma_px);
   stats.stereo_ms = timer.lap_ms();
+  stats.boost_ms += improver_.take_ms();
   images_.advance();
   ++view_.index;
   return out;
@@ -97,9 +99,9 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   const bool detected = detection_.due(count_observed(tracks_));
   if (detected) {
     detect(left, stats);
-    const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, stats);
+    const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, improver_, stats);
     locator_.locate(tracks_, view_, images_, found, stats);
-    recogniser_.recognise(tracks_, view_, images_.left(), stats);
+    recogniser_.recognise(tracks_, view_, images_.left(), improver_, stats);
   }
   CpuTimer timer;
   outliers_.judge(tracks_, view_, predictor_, stats);
@@ -147,6 +149,7 @@ void OrbFrontend::stand_by(const SensorPacket& packet, const StatePrior& prior) 
 TrackTransfer OrbFrontend::hand_over() {
   TrackTransfer out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
   if (out.image.empty()) return out;
+  improver_.improve(tracks_, view_, [](const OrbTrack&) { return true; });
   for (const OrbTrack& track : tracks_) {
     std::optional<TransferredTrack> handed = seen_by_second(track, T_C1C0_);
     if (!handed) continue;
@@ -200,6 +203,9 @@ bool OrbFrontend::resume(const TransferredTrack& handed, const Pyramid& image) {
 double OrbFrontend::longest_gap_s() const { return std::clamp(options_.memory_s, kShortestGap_s, kLongestGap_s); }
 
 void OrbFrontend::drop_ended() {
+  improver_.improve(tracks_, view_, [&](const OrbTrack& track) {
+    return track.status == TrackStatus::out_of_view && recogniser_.wants(track, view_);
+  });
   tracks_.drop_ended([&](const OrbTrack& track, const OrbPatches& patches) {
     if (track.status == TrackStatus::out_of_view) recogniser_.remember(track, patches.reference, view_, images_.t());
   });

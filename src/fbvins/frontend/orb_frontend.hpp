@@ -60,6 +60,7 @@ class OrbFrontend final : public LeadingFrontend {
   FrameImages images_;
   MotionPredictor predictor_;
   OrbDescriber describer_;
+  OrbImprover improver_;
   OrbView view_;
 
   OrbTracks tracks_;

@@ -15,13 +15,6 @@ constexpr double kFarthestFollowed_px = 50;
 /// A keypoint this near, times its scale, is the track's.
 constexpr double kSameFeature_px = 2;
 
-void take_over(OrbTrack& track, OrbView& view, std::size_t keypoint) {
-  track.descriptor = view.descriptor(keypoint);
-  track.raw = view.raw_descriptor(keypoint);
-  track.level = view.features.keypoints[keypoint].level;
-  view.used[keypoint] = 1;
-}
-
 }  // namespace
 
 bool OrbLocator::set_observed_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view) {
@@ -52,13 +45,14 @@ void OrbLocator::locate(OrbTracks& tracks, OrbView& view, const FrameImages& ima
     const auto k = static_cast<std::size_t>(found[i]);
     const Keypoint& keypoint = view.features.keypoints[k];
     if (track.observed) {
-      if ((keypoint.pixel - track.px).norm() < kSameFeature_px * keypoint.scale) take_over(track, view, k);
+      if ((keypoint.pixel - track.px).norm() < kSameFeature_px * keypoint.scale)
+        take_descriptor(track, tracks.patches(track), view, k);
       continue;
     }
     const auto px = place(track, tracks.patches(track), keypoint, images);
     if (!px) ++stats.lost_check;
     if (!set_observed_at(px, track, view)) continue;
-    take_over(track, view, k);
+    take_descriptor(track, tracks.patches(track), view, k);
     if (track.was_observed) keep_patch(track, tracks.patches(track));
   }
   stats.median_motion_px = median(motion_px_);

@@ -30,18 +30,20 @@ int pick_match(std::span<const std::int32_t> candidates, std::span<const std::ui
 
 }  // namespace
 
-void GuidedMatcher::match(std::span<const GuidedQuery> queries, const OrbFeatures& features, const KeypointGrid& grid,
+void GuidedMatcher::match(std::span<const GuidedQuery> queries, const MatchCandidates& candidates, const KeypointGrid& grid,
                           std::vector<int>& found) {
+  const auto& [keypoints, descriptors, usable] = candidates;
   found.assign(queries.size(), -1);
-  owner_.assign(features.size(), -1);
-  owner_distance_.assign(features.size(), kFar);
+  owner_.assign(keypoints.size(), -1);
+  owner_distance_.assign(keypoints.size(), kFar);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const GuidedQuery& query = queries[i];
-    grid.near(query.px, query.radius_px, query.level, features.keypoints, near_);
+    grid.near(query.px, query.radius_px, query.level, keypoints, near_);
+    if (!usable.empty()) std::erase_if(near_, [&](std::int32_t k) { return usable[static_cast<std::size_t>(k)] == 0; });
     distance_.resize(near_.size());
-    hamming_distances(query.descriptor, features.descriptors, near_, distance_.data());
+    hamming_distances(query.descriptor, descriptors, near_, distance_.data());
     int distance = kFar;
-    found[i] = pick_match(near_, distance_, features.keypoints, query.max_distance_bits, &distance);
+    found[i] = pick_match(near_, distance_, keypoints, query.max_distance_bits, &distance);
     if (found[i] < 0) continue;
     const auto k = static_cast<std::size_t>(found[i]);
     if (distance < owner_distance_[k]) owner_distance_[k] = distance, owner_[k] = static_cast<int>(i);

@@ -3,7 +3,8 @@
 // Buffers are reused; one instance, one thread.
 //
 //   GuidedMatcher matcher;
-//   matcher.match(queries, features, grid, found);        // found[i]: keypoint of queries[i], or -1
+//   matcher.match(queries, {features.keypoints, features.descriptors}, grid, found);        // found[i]: keypoint of queries[i],
+//   or -1
 #pragma once
 
 #include <cstdint>
@@ -29,12 +30,20 @@ struct GuidedQuery {
   int level = 0;
   int max_distance_bits = kMatchDistance_bits;
   Descriptor descriptor = {};
+  Descriptor raw = {};  ///< the same as extracted
+};
+
+/// What queries are compared with.
+struct MatchCandidates {
+  std::span<const Keypoint> keypoints;
+  std::span<const Descriptor> descriptors;
+  std::span<const std::uint8_t> usable = {};  ///< which of them; empty: all
 };
 
 class GuidedMatcher {
  public:
   /// found[i] is the keypoint that matches query i best, within ratio and mutually, or -1.
-  void match(std::span<const GuidedQuery> queries, const OrbFeatures& features, const KeypointGrid& grid,
+  void match(std::span<const GuidedQuery> queries, const MatchCandidates& candidates, const KeypointGrid& grid,
              std::vector<int>& found);
 
  private:

@@ -23,7 +23,7 @@ struct Scene {
   }
   std::vector<int> match(const std::vector<GuidedQuery>& queries) {
     std::vector<int> found;
-    GuidedMatcher().match(queries, features, grid, found);
+    GuidedMatcher().match(queries, {features.keypoints, features.descriptors}, grid, found);
     return found;
   }
 };

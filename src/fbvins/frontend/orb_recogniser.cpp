@@ -38,10 +38,13 @@ void OrbRecogniser::clear(OrbTracks& tracks) {
   }
 }
 
+bool OrbRecogniser::wants(const OrbTrack& track, const OrbView& view) const {
+  return options_.enabled && view.T_GC && track.seen_from_G && track.inverse_depth &&
+         track.age_frames >= kFewestFramesOfALandmark;
+}
+
 void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now) {
-  if (!options_.enabled || !view.T_GC || !track.seen_from_G || !track.inverse_depth ||
-      track.age_frames < kFewestFramesOfALandmark)
-    return;
+  if (!wants(track, view)) return;
   RememberedLandmark landmark;
   landmark.track = track.id;
   landmark.descriptor = track.descriptor;
@@ -57,13 +60,15 @@ void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& refere
   memory_.keep(std::move(landmark));
 }
 
-void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats) {
+void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, OrbImprover& improver,
+                              FrontendStats& stats) {
   if (!view.T_GC || !options_.enabled) return;
   memory_.expect(*view.T_GC, camera_, levels_, expected_);
   queries_.clear();
   for (const ExpectedLandmark& e : expected_)
-    queries_.push_back({e.px, kSearch_px, e.level, kMaxLandmarkDistance_bits, e.landmark->descriptor});
-  matcher_.match(queries_, view.features, view.grid, found_);
+    queries_.push_back({e.px, kSearch_px, e.level, kMaxLandmarkDistance_bits, e.landmark->descriptor, e.landmark->raw});
+  improver.improve_similar(queries_, view);
+  matcher_.match(queries_, view.comparable(), view.grid, found_);
 
   const auto miss = [&](std::size_t i) -> Vec2 {
     return view.features.keypoints[static_cast<std::size_t>(found_[i])].pixel - expected_[i].px;
@@ -97,16 +102,14 @@ bool OrbRecogniser::resume(const ExpectedLandmark& expected, std::size_t k, OrbT
   if (!refiner_.accept(fine, keypoint.pixel, keypoint.scale, kMinCorrelation)) return false;
   OrbTrack track;
   track.id = landmark.track;
-  track.descriptor = view.descriptor(k);
-  track.raw = view.raw_descriptor(k);
-  track.level = keypoint.level;
   track.inverse_depth = 1.0 / expected.depth_m;
   track.age_frames = landmark.age_frames;
   track.p_G = landmark.p_G;
   if (!set_observed(track, fine.px, camera_, view)) return false;
-  tracks.free_patches().reference = reference;
+  OrbPatches& patches = tracks.free_patches();
+  patches.reference = reference;
+  take_descriptor(track, patches, view, k);
   tracks.resume(track);
-  view.used[k] = 1;
   memory_.take_out(landmark.track);  // `landmark` ends here
   return true;
 }

@@ -6,13 +6,13 @@
 //   OrbRecogniser recogniser(camera, options.recognition, levels);
 //   tracks.drop_ended([&](const OrbTrack& t, const OrbPatches& p) { recogniser.remember(t, p.reference, view, now); });
 //   recogniser.locate(update, tracks);                 // their positions, from the estimator
-//   recogniser.recognise(tracks, view, left, stats);
+//   recogniser.recognise(tracks, view, left, improver, stats);
 #pragma once
 
 #include <vector>
 
 #include "fbvins/frontend/landmark_memory.hpp"
-#include "fbvins/frontend/orb_matching.hpp"
+#include "fbvins/frontend/orb_improver.hpp"
 #include "fbvins/frontend/orb_options.hpp"
 #include "fbvins/frontend/orb_track.hpp"
 
@@ -27,13 +27,15 @@ class OrbRecogniser {
   void locate(const LandmarkUpdate& update, OrbTracks& tracks);
   /// G is a new frame, or what was known in it no longer fits: all positions are void.
   void clear(OrbTracks& tracks);
-  /// Remembers a track that has gone out of view, if it may be a landmark. `view`: the last image that it was predicted to.
+  /// Whether a track that goes out of view may be a landmark. `view`: the last image that it was predicted to.
+  bool wants(const OrbTrack& track, const OrbView& view) const;
+  /// Remembers it, if so. Its descriptor is improved.
   void remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now);
   /// It is followed again.
   void forget(TrackId track) { memory_.take_out(track); }
   bool remembers(TrackId track) const { return memory_.contains(track); }
   void forget_unlocated(Time now) { memory_.forget_unlocated(now); }
-  void recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
+  void recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, OrbImprover& improver, FrontendStats& stats);
 
  private:
   bool resume(const ExpectedLandmark& expected, std::size_t keypoint, OrbTracks& tracks, OrbView& view, const Pyramid& left);

@@ -15,6 +15,7 @@ namespace orb_recogniser_test {
 struct Scene {
   TestWall wall;
   OrbDescriber describer{OrbOptions{}, make_identity_stage()};
+  OrbImprover improver{make_identity_stage()};
   OrbView view;
   Pyramid left;
   OrbTracks tracks{60};
@@ -59,7 +60,7 @@ TEST(OrbRecogniser, ReobservesTheWallFromAFewCentimetresAside) {
     if (!located_before_they_end) scene.recogniser.locate(scene.update(), scene.tracks);
     for (const OrbTrack& track : scene.before) EXPECT_TRUE(scene.recogniser.remembers(track.id));
     scene.look(0.1, 2);
-    scene.recogniser.recognise(scene.tracks, scene.view, scene.left, scene.stats);
+    scene.recogniser.recognise(scene.tracks, scene.view, scene.left, scene.improver, scene.stats);
     EXPECT_GT(scene.stats.recognised, 8);
     EXPECT_EQ(static_cast<std::size_t>(scene.stats.recognised), scene.tracks.size());
     for (const OrbTrack& track : scene.tracks) {
@@ -78,7 +79,7 @@ TEST(OrbRecogniser, TakesNoneWhereTooFewAgree) {
   for (std::size_t i = 0; i < 3; ++i) far_off.landmarks[i].p_G.x() -= 0.5;
   scene.recogniser.locate(far_off, scene.tracks);
   scene.look(0.1, 2);
-  scene.recogniser.recognise(scene.tracks, scene.view, scene.left, scene.stats);
+  scene.recogniser.recognise(scene.tracks, scene.view, scene.left, scene.improver, scene.stats);
   EXPECT_EQ(scene.stats.recognised, 0);
 }
 

@@ -60,14 +60,13 @@ void OrbStarter::run(const Pass& pass, OrbTracks& tracks, OrbView& view, const P
     const bool crowded =
         std::any_of(occupied_.begin(), occupied_.end(), [&](const Vec2& other) { return (other - px).squaredNorm() < min2; });
     if (crowded || !start_track(k, pass.max_uncertainty_px, tracks, view, left)) continue;
-    view.used[k] = 1;
     occupied_.push_back(px);
     ++count_[cell_of(px)];
     ++stats.detected;
   }
 }
 
-bool OrbStarter::start_track(std::size_t k, double max_uncertainty_px, OrbTracks& tracks, const OrbView& view,
+bool OrbStarter::start_track(std::size_t k, double max_uncertainty_px, OrbTracks& tracks, OrbView& view,
                              const Pyramid& left) const {
   const Keypoint& keypoint = view.features.keypoints[k];
   const auto normalised = camera_.undistort(keypoint.pixel);
@@ -77,9 +76,7 @@ bool OrbStarter::start_track(std::size_t k, double max_uncertainty_px, OrbTracks
   if (weakest_direction_px(patches.newest.levels[0]) > max_uncertainty_px) return false;
   if (!patches.reference.take(left, keypoint.pixel, camera_, *normalised)) return false;
   OrbTrack track;
-  track.descriptor = view.descriptor(k);
-  track.raw = view.raw_descriptor(k);
-  track.level = keypoint.level;
+  take_descriptor(track, patches, view, k);
   track.px = keypoint.pixel;
   track.normalised = *normalised;
   track.last_seen = view.t;

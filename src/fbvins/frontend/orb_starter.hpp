@@ -33,8 +33,7 @@ class OrbStarter {
   std::size_t cell_of(const Vec2& px) const;
   void list_unused(const OrbView& view);
   void run(const Pass& pass, OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
-  bool start_track(std::size_t keypoint, double max_uncertainty_px, OrbTracks& tracks, const OrbView& view,
-                   const Pyramid& left) const;
+  bool start_track(std::size_t keypoint, double max_uncertainty_px, OrbTracks& tracks, OrbView& view, const Pyramid& left) const;
 
   Camera camera_;
   int wanted_;

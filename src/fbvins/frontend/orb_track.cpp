@@ -46,6 +46,15 @@ void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion
   }
 }
 
+void take_descriptor(OrbTrack& track, OrbPatches& patches, OrbView& view, std::size_t k) {
+  track.descriptor = view.descriptor(k);
+  track.raw = view.raw_descriptor(k);
+  track.level = view.features.keypoints[k].level;
+  track.unimproved = view.improves && view.improved[k] == 0;
+  if (track.unimproved) patches.input = view.input(k);
+  view.used[k] = 1;
+}
+
 bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view) {
   if (!camera.inside(px, kPatchBorder_px)) return false;
   const auto normalised = camera.undistort(px);

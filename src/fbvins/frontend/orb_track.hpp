@@ -34,9 +34,10 @@ struct OrbTrack : TrackState {
     std::int64_t image = -1;  // OrbView::index
   };
 
-  Descriptor descriptor;  ///< as last seen
-  Descriptor raw;         ///< the same before it was improved
-  int level = 0;          ///< of the scale pyramid, as last seen
+  Descriptor descriptor;    ///< as last seen
+  Descriptor raw;           ///< the same as extracted
+  bool unimproved = false;  ///< the descriptor still is as extracted, and to be improved before it is compared
+  int level = 0;            ///< of the scale pyramid, as last seen
   Time last_seen;
   bool was_observed = false;                ///< in the image before
   int newest_levels = 0;                    ///< number of the newest patch's finest levels that are cut from this image already
@@ -53,15 +54,19 @@ struct OrbTrack : TrackState {
   }
 };
 
+/// What a track keeps that is too large to be moved.
 struct OrbPatches {
   KltTemplate newest;        ///< of the last image in which it was observed
   PatchReference reference;  ///< of the image in which the track began or its reference was renewed
+  DescriptorInput input;     ///< what the descriptor is improved from, while it is not
 };
 
 using OrbTracks = TrackTable<OrbTrack, OrbPatches>;
 
 /// Moves every track to its predicted position in the newest image.
 void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion, double typical_inverse_depth);
+/// Gives the track the descriptor of keypoint k, which is used then.
+void take_descriptor(OrbTrack& track, OrbPatches& patches, OrbView& view, std::size_t k);
 /// Records that the track is observed at px in the newest image. False at the border.
 bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view);
 /// Of two tracks that have come together the older stays; and of all at most `most`, the older ones. Of the others, those of

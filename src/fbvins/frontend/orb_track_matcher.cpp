@@ -17,41 +17,71 @@ constexpr double kInlier_px = 3;
 
 }  // namespace
 
-const std::vector<int>& OrbTrackMatcher::match(const OrbTracks& tracks, const OrbView& view, bool well_predicted,
-                                               FrontendStats& stats) {
+void OrbTrackMatcher::ask(const OrbTracks& tracks, bool well_predicted) {
   queries_.clear();
   for (const OrbTrack& track : tracks) {
     GuidedQuery query;
     query.px = track.px;
     query.level = track.level;
     query.descriptor = track.descriptor;
+    query.raw = track.raw;
     query.radius_px = well_predicted ? search_px_ : kSearchBlind_px;
     if (!track.was_observed) query.max_distance_bits = kReturningDistance_bits;
     queries_.push_back(query);
   }
-  matcher_.match(queries_, view.features, view.grid, found_);
+}
+
+const std::vector<int>& OrbTrackMatcher::match(OrbTracks& tracks, OrbView& view, bool well_predicted, OrbImprover& improver,
+                                               FrontendStats& stats) {
+  improved_ = view.improves;
+  if (improved_) improver.improve(tracks, view, [](const OrbTrack& track) { return !track.observed; });
+  ask(tracks, well_predicted);
+  if (improved_) {
+    match_raw(tracks, view);
+    match_improved(tracks, view, improver);
+  } else {
+    matcher_.match(queries_, view.comparable(), view.grid, found_);
+  }
   collect(tracks, view, found_, matches_);
   stats.matches.found = static_cast<int>(matches_.size());
-  improved_ = view.improved;
-  if (improved_) match_raw(tracks, view);
   stats.raw_matches.found = static_cast<int>((improved_ ? raw_matches_ : matches_).size());
   return found_;
 }
 
-/// The same search with descriptors as extracted, for the statistics only.
+/// With descriptors as extracted: those of tracks that alignment has lost are for the statistics only.
 void OrbTrackMatcher::match_raw(const OrbTracks& tracks, const OrbView& view) {
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    queries_[i].descriptor = tracks[i].raw;
-    queries_[i].max_distance_bits = std::min(queries_[i].max_distance_bits, kRawDistance_bits);
+  raw_queries_ = queries_;
+  for (GuidedQuery& query : raw_queries_) {
+    query.descriptor = query.raw;
+    query.max_distance_bits = std::min(query.max_distance_bits, kRawDistance_bits);
   }
-  matcher_.match(queries_, view.raw, view.grid, found_raw_);
+  matcher_.match(raw_queries_, view.as_extracted(), view.grid, found_raw_);
   collect(tracks, view, found_raw_, raw_matches_);
+}
+
+/// With improved ones: those tracks. A keypoint that a track found by alignment has is not another's.
+void OrbTrackMatcher::match_improved(const OrbTracks& tracks, OrbView& view, OrbImprover& improver) {
+  lost_queries_.clear();
+  taken_.assign(view.features.size(), 0);
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (!tracks[i].observed) lost_queries_.push_back(queries_[i]);
+    else if (found_raw_[i] >= 0) taken_[static_cast<std::size_t>(found_raw_[i])] = 1;
+  }
+  improver.improve_similar(lost_queries_, view);
+  matcher_.match(lost_queries_, view.comparable(), view.grid, found_lost_);
+  found_ = found_raw_;
+  for (std::size_t i = 0, lost = 0; i < tracks.size(); ++i) {
+    if (tracks[i].observed) continue;
+    const int k = found_lost_[lost++];
+    found_[i] = k >= 0 && taken_[static_cast<std::size_t>(k)] == 0 ? k : -1;
+  }
 }
 
 void OrbTrackMatcher::collect(const OrbTracks& tracks, const OrbView& view, const std::vector<int>& found, Matches& matches) {
   matches.clear();
   for (std::size_t i = 0; i < tracks.size(); ++i)
-    if (found[i] >= 0) matches.emplace_back(tracks[i].id, view.features.keypoints[static_cast<std::size_t>(found[i])].pixel);
+    if (found[i] >= 0 && !tracks[i].observed)
+      matches.emplace_back(tracks[i].id, view.features.keypoints[static_cast<std::size_t>(found[i])].pixel);
 }
 
 int OrbTrackMatcher::inliers(const OrbTracks& tracks, const Matches& matches) {

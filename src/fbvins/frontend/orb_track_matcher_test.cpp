@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "fbvins/frontend/orb_starter.hpp"
 #include "tests/support/test_wall.hpp"
 
@@ -23,9 +25,10 @@ struct Scene {
   OrbView view;
   OrbTracks tracks{60};
   FrontendStats stats;
+  OrbImprover improver;
 
-  explicit Scene(std::unique_ptr<DescriptorStage> stage) {
-    OrbDescriber describer(OrbOptions{}, std::move(stage));
+  explicit Scene(const std::shared_ptr<DescriptorStage>& stage) : improver(stage) {
+    OrbDescriber describer(OrbOptions{}, stage);
     const auto before = wall.render(0, 1), now = wall.render(0.05, 2);
     Pyramid left;
     left.build(before->view(), kOrbAlignmentLevels);
@@ -40,7 +43,7 @@ struct Scene {
 TEST(OrbTrackMatcher, FindsTracksWhereTheyAreExpected) {
   Scene scene(make_identity_stage());
   OrbTrackMatcher matcher(12);
-  const std::vector<int> found = matcher.match(scene.tracks, scene.view, true, scene.stats);
+  const std::vector<int> found = matcher.match(scene.tracks, scene.view, true, scene.improver, scene.stats);
   int matched = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i] < 0) continue;
@@ -62,9 +65,29 @@ TEST(OrbTrackMatcher, FindsTracksWhereTheyAreExpected) {
 TEST(OrbTrackMatcher, AlsoCountsMatchesOfDescriptorsAsExtracted) {
   Scene scene(std::make_unique<Leveller>());
   OrbTrackMatcher matcher(12);
-  (void)matcher.match(scene.tracks, scene.view, true, scene.stats);
+  (void)matcher.match(scene.tracks, scene.view, true, scene.improver, scene.stats);
   EXPECT_GT(scene.stats.raw_matches.found, 10);
   EXPECT_LT(scene.stats.matches.found, scene.stats.raw_matches.found) << "equal descriptors fail the ratio test";
+}
+
+/// Of a track that alignment has found, the keypoint at its position is enough: nothing is improved for it.
+TEST(OrbTrackMatcher, ImprovesWhatLostTracksResembleOnly) {
+  Scene scene(std::make_unique<Leveller>());
+  OrbTrackMatcher matcher(12);
+  for (OrbTrack& track : scene.tracks) track.observed = true;
+  const std::vector<int> followed = matcher.match(scene.tracks, scene.view, true, scene.improver, scene.stats);
+  const auto improved = [&] { return std::count(scene.view.improved.begin(), scene.view.improved.end(), 1); };
+  EXPECT_GT(std::count_if(followed.begin(), followed.end(), [](int k) { return k >= 0; }), 10);
+  EXPECT_EQ(improved(), 0);
+  EXPECT_EQ(scene.stats.matches.found, 0) << "none was lost";
+  for (OrbTrack& track : scene.tracks) {
+    EXPECT_TRUE(track.unimproved);
+    track.observed = track.id.value > 0;
+  }
+  (void)matcher.match(scene.tracks, scene.view, true, scene.improver, scene.stats);
+  EXPECT_GT(improved(), 0);
+  EXPECT_LT(improved(), 10);
+  for (const OrbTrack& track : scene.tracks) EXPECT_EQ(track.unimproved, track.observed);
 }
 
 }  // namespace orb_track_matcher_test

@@ -7,14 +7,15 @@ namespace fbvins {
 
 double OrbDescriber::describe(const ImageView& image, OrbView& view, const Mask* mask) {
   extractor_.extract(image, view.features, mask);
-  view.improved = stage_->changes_descriptors();
-  if (view.improved) {
-    view.raw.keypoints = view.features.keypoints;
-    view.raw.descriptors = view.features.descriptors;
+  view.improves = stage_->changes_descriptors();
+  double ms = 0;
+  if (view.improves) {
+    view.descriptors = view.features.descriptors;
+    view.improved.assign(view.features.size(), 0);
+    CpuTimer timer;
+    stage_->look_at(image.width, image.height, view.features, view.context);
+    ms = timer.lap_ms();
   }
-  CpuTimer timer;
-  stage_->improve(image.width, image.height, view.features);
-  const double ms = timer.lap_ms();
   view.grid.build(image.width, image.height, view.features.keypoints);
   view.used.assign(view.features.size(), 0);
   return ms;

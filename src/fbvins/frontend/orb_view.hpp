@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The newest left image for all parts of the orb frontend: its keypoints with the descriptors in use, and the camera's pose.
-// OrbDescriber fills it: extraction, and the stage that may improve descriptors (paper 2.2.2).
+// OrbDescriber fills it: extraction, and one look by the stage that may improve descriptors (paper 2.2.2). Which of them are
+// improved is OrbImprover's matter.
 // Buffers are reused; one instance, one thread.
 //
 //   OrbDescriber describer(orb_options, make_identity_stage());
@@ -14,7 +15,7 @@
 
 #include "fbvins/features/descriptor_stage.hpp"
 #include "fbvins/features/orb.hpp"
-#include "fbvins/frontend/keypoint_grid.hpp"
+#include "fbvins/frontend/orb_matching.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
@@ -22,16 +23,25 @@ namespace fbvins {
 struct OrbView {
   std::int64_t index = 0;  ///< of usable left images, counted from 0
   Time t;
-  std::optional<Pose<G, C0>> T_GC;  ///< predicted; none without a state of the estimator
-  OrbFeatures features;
-  OrbFeatures raw;  ///< the same before descriptors were improved; empty where they are as extracted
-  bool improved = false;
+  std::optional<Pose<G, C0>> T_GC;      ///< predicted; none without a state of the estimator
+  OrbFeatures features;                 ///< as extracted
+  bool improves = false;                ///< whether descriptors are improved; the next three are of use only then
+  ImageContext context;                 ///< of the last image of which keypoints were detected
+  std::vector<Descriptor> descriptors;  ///< of the keypoints: improved, or as extracted
+  std::vector<std::uint8_t> improved;   ///< for each keypoint, whether its descriptor is improved
   KeypointGrid grid;
   std::vector<std::uint8_t> used;  ///< for each keypoint, whether a track has it
 
-  const Descriptor& descriptor(std::size_t k) const { return features.descriptors[k]; }
-  /// The descriptor as extracted; zero where none was improved.
-  Descriptor raw_descriptor(std::size_t k) const { return improved ? raw.descriptors[k] : Descriptor{}; }
+  const Descriptor& descriptor(std::size_t k) const { return improves ? descriptors[k] : features.descriptors[k]; }
+  const Descriptor& raw_descriptor(std::size_t k) const { return features.descriptors[k]; }
+  /// With descriptors as extracted.
+  MatchCandidates as_extracted() const { return {features.keypoints, features.descriptors}; }
+  /// With those in use. Where descriptors are improved, the others resemble nothing that was looked for.
+  MatchCandidates comparable() const {
+    return improves ? MatchCandidates{features.keypoints, descriptors, improved} : as_extracted();
+  }
+  /// What the descriptor is improved from.
+  DescriptorInput input(std::size_t k) const { return {features.margins[k], features.keypoints[k], context.mean_log_score}; }
 };
 
 class OrbDescriber {
@@ -39,7 +49,7 @@ class OrbDescriber {
   OrbDescriber(const OrbOptions& options, std::shared_ptr<DescriptorStage> stage)
       : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()) {}
 
-  /// Fills all of the view that depends on the image alone, and on its camera's mask. Returns the CPU time that improving took,
+  /// Fills all of the view that depends on the image alone, and on its camera's mask. Returns the CPU time that the stage took,
   /// ms.
   double describe(const ImageView& image, OrbView& view, const Mask* mask = nullptr);
 
