@@ -41,6 +41,15 @@ double sum_of_factors(const WindowProblem& w, double cost, const OfFactor& of) {
   return cost + of_kind;
 }
 
+/// All but what landmarks give.
+double linearise_factors(const WindowProblem& window, NormalEquations& out) {
+  out.layout = WindowLayout(window);
+  const int n = out.layout.size();
+  out.H.setZero(n, n);
+  out.g.setZero(n);
+  return sum_of_factors(window, prior_term(window, &out), [&](const Factor& f) { return f.linearise(window, out); });
+}
+
 /// Rows of calibration that is not estimated, and of padding: decoupled, unit information, no gradient.
 void fix_inactive_calibration(const WindowWeights& weights, NormalEquations& out) {
   const int begin = out.layout.calibration_row();
@@ -124,15 +133,18 @@ double cost_of(const WindowProblem& window, PairTable& pairs) {
   return cost + landmark_cost(window, pairs);
 }
 
-double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out) {
-  out.layout = WindowLayout(window);
-  const int n = out.layout.size();
-  out.H.setZero(n, n);
-  out.g.setZero(n);
-  out.points.clear();
+double gradient_of(const WindowProblem& window, PairTable& pairs, WindowGradient& out) {
   pairs.fill(window, true);
-  double cost = sum_of_factors(window, prior_term(window, &out), [&](const Factor& f) { return f.linearise(window, out); });
-  cost += add_landmarks(window, pairs, out);
+  const double cost = linearise_factors(window, out.of_factors);
+  out.dense = out.of_factors.g;
+  return cost + add_landmark_gradient(window, pairs, out.of_factors.layout, out);
+}
+
+double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out) {
+  pairs.fill(window, true);
+  const double of_factors = linearise_factors(window, out);
+  out.points.clear();
+  const double cost = of_factors + add_landmarks(window, pairs, out);
   if (window.calibrating()) fix_inactive_calibration(window.weights, out);
   return cost;
 }

@@ -72,6 +72,16 @@ bool PointBlocks::eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& 
   return true;
 }
 
+void PointBlocks::eliminate_gradient(Eigen::VectorXd& g) const {
+  for (const PointBlock& point : points_) {
+    const Eigen::Vector3d v_inv_w = point.V_inverse * point.w;
+    for (int k = 0; k < point.count; ++k) {
+      const Eigen::Map<const Eigen::Matrix<double, 3, 6>> WT(coupling_.data() + 18 * (point.first + k));
+      g.segment<6>(offsets_[point.first + k]).noalias() -= WT.transpose() * v_inv_w;
+    }
+  }
+}
+
 void PointBlocks::back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const {
   point_steps.resize(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
