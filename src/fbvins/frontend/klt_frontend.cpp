@@ -131,7 +131,7 @@ bool KltFrontend::start_track(const Vec2& px) {
 }
 
 bool KltFrontend::cut_patches(KltTrack& track, KltPatches& patches, const Pyramid& image) const {
-  if (!patches.newest.cut(image, track.px, 0, kKltLevels - 1)) return false;
+  if (!patches.newest.cut(image, track.px, 0, 0)) return false;
   follower_.set_reference(track, patches, image);
   track.at_age(0) = track.normalised;
   return true;

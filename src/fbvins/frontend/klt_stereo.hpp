@@ -65,7 +65,7 @@ class KltStereoMatcher {
   Mat3 R_rl_;  // C1 <- C0
   Vec3 p_rl_;
   double focal_px_;
-  KltTemplate scratch_;
+  KltTemplate scratch_, whole_;
   PatchRefiner refiner_;
 };
 
