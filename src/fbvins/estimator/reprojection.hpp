@@ -110,7 +110,8 @@ inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, c
 /// Adds J^T r of a residual r that is weighed (W6, W7), without forming J.
 template <class OfFrame>
 void add_gradient(const CameraGeometry& cameras, const PairGeometry& pair, const WindowLandmark& l, const Vec3& x_h,
-                  const WindowObservation& o, const Vec3& p_C, const Vec2& r, OfFrame of_host, OfFrame of_target, Vec3& of_point) {
+                  const WindowObservation& o, const Vec3& p_C, const Vec2& r, OfFrame of_host, OfFrame of_target,
+                  Vec3& of_point) {
   const double rho = l.alpha_beta_rho.z();
   const double iz = 1.0 / p_C.z();
   const Vec2 s = o.sqrt_information.transpose() * r;

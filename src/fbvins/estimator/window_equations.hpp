@@ -64,7 +64,8 @@ class PairTable {
 
 struct NormalEquations {
   WindowLayout layout;
-  Eigen::MatrixXd H;  ///< lower triangle
+  bool gradient_alone = false;  ///< nobody reads H: what is added to it may be left out
+  Eigen::MatrixXd H;            ///< lower triangle
   Eigen::VectorXd g;
   PointBlocks points;  ///< landmarks, in the window's order
 };
