@@ -297,7 +297,7 @@ TEST(ConsistencyMonitor, ABiasThatJumpsIsAFault) {
   }
 }
 
-TEST(ConsistencyMonitor, TwoNewWorldsWithinSecondsAreHopeless) {
+TEST(ConsistencyMonitor, TwoNewWorldsWithinSecondsAreUnrecoverable) {
   Scene scene;
   ConsistencyMonitor monitor(assumed(), false);
   begin(monitor, scene);

@@ -23,6 +23,7 @@ void add_imu_blocks(int i, int j, const Mat15 (&J)[2], const Eigen::Matrix<doubl
     const Vec15 gradient = J[a].transpose() * r;
     g.segment<6>(pose[a]) += gradient.head<6>();
     g.segment<9>(speed[a]) += gradient.tail<9>();
+    if (out.gradient_alone) continue;
     if (with_tilt) {
       const Eigen::Matrix<double, 15, 2> block = J[a].transpose() * J_tilt;
       H.block<6, 2>(pose[a], at.tilt_row()) += block.topRows<6>();

@@ -107,6 +107,29 @@ inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, c
   return true;
 }
 
+/// Adds J^T r of a residual r that is weighed (W6, W7), without forming J.
+template <class OfFrame>
+void add_gradient(const CameraGeometry& cameras, const PairGeometry& pair, const WindowLandmark& l, const Vec3& x_h,
+                  const WindowObservation& o, const Vec3& p_C, const Vec2& r, OfFrame of_host, OfFrame of_target,
+                  Vec3& of_point) {
+  const double rho = l.alpha_beta_rho.z();
+  const double iz = 1.0 / p_C.z();
+  const Vec2 s = o.sqrt_information.transpose() * r;
+  const Vec3 a = cameras.R_BC[o.camera] * Vec3(iz * s.x(), iz * s.y(), -iz * iz * s.dot(p_C.head<2>()));  // A^T r
+  const Vec3 b = pair.R_th_first.transpose() * a;
+  const Vec3 c = cameras.R_BC[l.camera].transpose() * b;
+  of_point.x() += c.x();
+  of_point.y() += c.y();
+  of_point.z() += b.dot(cameras.t_BC[l.camera]) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.camera] + o.displacement_B);
+  if (o.frame == l.host) return;
+  const Vec3 p_B = pair.R_th_first * x_h + rho * pair.t_th_first;
+  const Vec3 translation = rho * (pair.R_t_first * a);
+  of_host.template head<3>() += translation;
+  of_host.template tail<3>() += x_h.cross(b);
+  of_target.template head<3>() -= translation;
+  of_target.template tail<3>() += a.cross(p_B);
+}
+
 /// Fills the two rows of Jacobian and residual, unweighted (W6-W8). Same frame: the pose columns stay zero.
 template <int Columns>
 void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair, bool same_frame, const WindowLandmark& l,

@@ -15,12 +15,13 @@ constexpr double kPriorOutlier_sigma = 6;
 /// Observations with a larger residual in a solution are removed.
 constexpr double kOutlier_sigma = 4;
 
-/// Removes the outliers among the observations of a landmark. Returns how many.
-int remove_far_observations(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
+/// Removes the outliers among the observations of a landmark, which have these residuals. Returns how many.
+int remove_far_observations(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers,
+                            const std::vector<Vec2>& residuals) {
   int removed = 0;
   for (int k = 0; k < numbers.observation_count; ++k) {
     const WindowObservation& o = solved.observations[numbers.first_observation + k];
-    if (!(solved.residual(numbers, o).norm() > kOutlier_sigma)) continue;
+    if (!(residuals[static_cast<std::size_t>(k)].norm() > kOutlier_sigma)) continue;
     ++removed;
     const StereoObservation* s = landmark.observation_in(solved.frames[o.frame].id);
     if (s == nullptr) continue;
@@ -36,10 +37,13 @@ int remove_far_observations(Landmark& landmark, const WindowProblem& solved, con
 }  // namespace
 
 int SlidingWindow::remove_outliers(const WindowProblem& solved) {
+  const CameraGeometry cameras(solved.calibration);
+  std::vector<Vec2> residuals;
   int removed = 0;
   for (const WindowLandmark& numbers : solved.landmarks) {
     Landmark* landmark = landmarks_.find(numbers.id);
-    const int of_this = landmark ? remove_far_observations(*landmark, solved, numbers) : 0;
+    if (landmark) solved.residuals(cameras, numbers, residuals);
+    const int of_this = landmark ? remove_far_observations(*landmark, solved, numbers, residuals) : 0;
     if (of_this > 0) count_outlier(*landmark, solved, numbers);
     removed += of_this;
   }

@@ -20,6 +20,7 @@ double prior_term(const WindowProblem& w, NormalEquations* out) {
   const Eigen::VectorXd gradient = prior.quadratic.gradient(dx);
   for (int c = 0; c < prior.quadratic.size(); ++c) {
     out->g(rows[c]) += gradient(c);
+    if (out->gradient_alone) continue;
     for (int r = 0; r < prior.quadratic.size(); ++r)
       if (rows[r] >= rows[c]) out->H(rows[r], rows[c]) += prior.quadratic.H(r, c);
   }
@@ -39,6 +40,16 @@ double sum_of_factors(const WindowProblem& w, double cost, const OfFactor& of) {
     of_kind += of(*factor);
   }
   return cost + of_kind;
+}
+
+/// All but what landmarks give.
+double linearise_factors(const WindowProblem& window, NormalEquations& out) {
+  out.layout = WindowLayout(window);
+  const int n = out.layout.size();
+  if (out.gradient_alone) out.H.resize(n, n);
+  else out.H.setZero(n, n);
+  out.g.setZero(n);
+  return sum_of_factors(window, prior_term(window, &out), [&](const Factor& f) { return f.linearise(window, out); });
 }
 
 /// Rows of calibration that is not estimated, and of padding: decoupled, unit information, no gradient.
@@ -81,9 +92,10 @@ void add_residual(const WindowProblem& window, const std::vector<Variable>& vari
   for (const Variable& v : variables)
     for (int k = 0; k < window.size_of(v); ++k) rows.push_back(row_of(window, out.layout, v) + k);
   const Eigen::VectorXd g = weight * J.transpose() * r;
+  for (std::size_t i = 0; i < rows.size(); ++i) out.g(rows[i]) += g(static_cast<Eigen::Index>(i));
+  if (out.gradient_alone) return;
   const Eigen::MatrixXd H = weight * J.transpose() * J;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    out.g(rows[i]) += g(static_cast<Eigen::Index>(i));
     for (std::size_t k = 0; k < rows.size(); ++k)
       if (rows[i] >= rows[k]) out.H(rows[i], rows[k]) += H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
   }
@@ -124,15 +136,19 @@ double cost_of(const WindowProblem& window, PairTable& pairs) {
   return cost + landmark_cost(window, pairs);
 }
 
-double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out) {
-  out.layout = WindowLayout(window);
-  const int n = out.layout.size();
-  out.H.setZero(n, n);
-  out.g.setZero(n);
-  out.points.clear();
+double gradient_of(const WindowProblem& window, PairTable& pairs, WindowGradient& out) {
+  out.of_factors.gradient_alone = true;
   pairs.fill(window, true);
-  double cost = sum_of_factors(window, prior_term(window, &out), [&](const Factor& f) { return f.linearise(window, out); });
-  cost += add_landmarks(window, pairs, out);
+  const double cost = linearise_factors(window, out.of_factors);
+  out.dense = out.of_factors.g;
+  return cost + add_landmark_gradient(window, pairs, out.of_factors.layout, out);
+}
+
+double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out) {
+  pairs.fill(window, true);
+  const double of_factors = linearise_factors(window, out);
+  out.points.clear();
+  const double cost = of_factors + add_landmarks(window, pairs, out);
   if (window.calibrating()) fix_inactive_calibration(window.weights, out);
   return cost;
 }

@@ -64,7 +64,8 @@ class PairTable {
 
 struct NormalEquations {
   WindowLayout layout;
-  Eigen::MatrixXd H;  ///< lower triangle
+  bool gradient_alone = false;  ///< nobody reads H: what is added to it may be left out
+  Eigen::MatrixXd H;            ///< lower triangle
   Eigen::VectorXd g;
   PointBlocks points;  ///< landmarks, in the window's order
 };
@@ -75,8 +76,17 @@ struct ReducedEquations {
   Eigen::VectorXd g;
 };
 
+/// Of the cost by all variables.
+struct WindowGradient {
+  Eigen::VectorXd dense;        ///< by what NormalEquations::g is of
+  std::vector<Vec3> landmarks;  ///< in the window's order
+  NormalEquations of_factors;   ///< working memory
+};
+
 /// Cost at the window's estimate.
 double cost_of(const WindowProblem& window, PairTable& pairs);
+/// The same, with the gradient. Not while calibrating.
+double gradient_of(const WindowProblem& window, PairTable& pairs, WindowGradient& out);
 /// The same, with the normal equations.
 double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out);
 /// Eliminates the landmarks without damping (W10); H is filled in both triangles.
@@ -84,6 +94,7 @@ ReducedEquations reduced(NormalEquations& equations);
 
 /// Terms of all landmarks: reprojections and landmark priors. In window_landmark_terms.cpp.
 double landmark_cost(const WindowProblem& window, const PairTable& pairs);
+double add_landmark_gradient(const WindowProblem& window, const PairTable& pairs, const WindowLayout& at, WindowGradient& out);
 double add_landmarks(const WindowProblem& window, const PairTable& pairs, NormalEquations& out);
 
 }  // namespace fbvins

@@ -194,6 +194,40 @@ double landmark_cost(const WindowProblem& w, const PairTable& pairs) {
   return cost;
 }
 
+double add_landmark_gradient(const WindowProblem& w, const PairTable& pairs, const WindowLayout& at, WindowGradient& out) {
+  const CameraGeometry cameras(w.calibration);
+  double cost = 0;
+  out.landmarks.assign(w.landmarks.size(), Vec3::Zero());
+  for (std::size_t i = 0; i < w.landmarks.size(); ++i) {
+    const WindowLandmark& l = w.landmarks[i];
+    const Vec3 x_h = scaled_point_in_host(cameras, l);
+    auto of_host = out.dense.segment<6>(at.pose_row(l.host));
+    const WindowObservation* begin = w.observations.data() + l.first_observation;
+    for (const WindowObservation* o = begin; o != begin + l.observation_count; ++o) {
+      const PairGeometry& pair = pairs(l.host, o->frame);
+      Vec3 p_C;
+      Vec2 r;
+      if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
+        cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
+        continue;
+      }
+      const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
+      cost += robust.cost;
+      r *= robust.weight;
+      add_gradient(cameras, pair, l, x_h, *o, p_C, r, of_host, out.dense.segment<6>(at.pose_row(o->frame)), out.landmarks[i]);
+    }
+    if (l.prior < 0) continue;
+    const LandmarkPrior& prior = w.landmark_priors[l.prior];
+    const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_FB, l, prior);
+    const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
+    const LandmarkPriorJacobian J(cameras, w.linearisation_point(l.host).T_FB, l, prior);
+    cost += robust.cost;
+    of_host += robust.weight * J.host.transpose() * r;
+    out.landmarks[i] += robust.weight * J.point.transpose() * r;
+  }
+  return cost;
+}
+
 double add_landmarks(const WindowProblem& window, const PairTable& pairs, NormalEquations& out) {
   return window.calibrating() ? add_landmarks_of<32>(window, pairs, out) : add_landmarks_of<16>(window, pairs, out);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace fbvins {
 
@@ -28,15 +29,19 @@ int WindowProblem::index_of(FrameId id) const {
   return -1;
 }
 
-Vec2 WindowProblem::residual(const WindowLandmark& landmark, const WindowObservation& observation) const {
-  const CameraGeometry cameras(calibration);
-  PairGeometry geometry;
-  geometry.set(frames[landmark.host].state.T_FB, frames[observation.frame].state.T_FB);
-  Vec3 p_C;
-  Vec2 r;
-  if (reproject(cameras, geometry, scaled_point_in_host(cameras, landmark), landmark.alpha_beta_rho.z(), observation, p_C, r))
-    return r;
-  return Vec2::Constant(std::numeric_limits<double>::infinity());
+void WindowProblem::residuals(const CameraGeometry& cameras, const WindowLandmark& l, std::vector<Vec2>& out) const {
+  out.clear();
+  const Vec3 x_h = scaled_point_in_host(cameras, l);
+  PairGeometry pair;
+  int of_pair = -1;
+  for (int k = 0; k < l.observation_count; ++k) {
+    const WindowObservation& o = observations[l.first_observation + k];
+    if (std::exchange(of_pair, o.frame) != o.frame) pair.set(frames[l.host].state.T_FB, frames[o.frame].state.T_FB);
+    Vec3 p_C;
+    Vec2 r;
+    const bool seen = reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), o, p_C, r);
+    out.push_back(seen ? r : Vec2::Constant(std::numeric_limits<double>::infinity()));
+  }
 }
 
 Vec3 WindowProblem::distance_to_prior(const WindowLandmark& l) const {

@@ -100,8 +100,9 @@ struct WindowProblem {
     return weights.at_first_estimates && f.in_prior ? f.first_estimate : f.state;
   }
 
-  /// Whitened reprojection residual of an observation at the current estimate; infinite behind the camera.
-  Vec2 residual(const WindowLandmark& landmark, const WindowObservation& observation) const;
+  /// Whitened reprojection residuals of a landmark's observations at the current estimate; infinite behind the camera. `cameras`:
+  /// of the calibration.
+  void residuals(const CameraGeometry& cameras, const WindowLandmark& landmark, std::vector<Vec2>& out) const;
   /// Whitened distance of a landmark that has a prior from it, at the current estimate.
   Vec3 distance_to_prior(const WindowLandmark& landmark) const;
   /// Of one that it has.

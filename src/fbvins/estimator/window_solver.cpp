@@ -112,19 +112,37 @@ bool WindowSolver::step(double lambda, WindowInformation& information) {
   reduced_.g = equations_.g;
   reduced_.H.diagonal() *= 1.0 + lambda;
   reduced_.H.diagonal().array() += kRegularisation;
-  const ThirdDamping depth_damping{lambda > 0 ? kDepthDamping : 0.0, !images_show_scale_};
-  if (!equations_.points.eliminate(lambda, reduced_.H, reduced_.g, depth_damping)) return false;
+  if (!equations_.points.eliminate(lambda, reduced_.H, reduced_.g, depth_damping(lambda))) return false;
   if (!information.factorise(equations_.layout, reduced_.H)) return false;
+  return finish_step(lambda, information);
+}
+
+double WindowSolver::renew_gradient(const WindowProblem& window) { return gradient_of(window, pairs_, gradient_); }
+
+bool WindowSolver::step_again(double lambda, const WindowInformation& information) {
+  equations_.g = gradient_.dense;
+  std::vector<PointBlock>& points = equations_.points.points();
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].w = gradient_.landmarks[i];
+  reduced_.g = equations_.g;
+  equations_.points.eliminate_gradient(reduced_.g);
+  return finish_step(lambda, information);
+}
+
+ThirdDamping WindowSolver::depth_damping(double lambda) const { return {lambda > 0 ? kDepthDamping : 0.0, !images_show_scale_}; }
+
+/// From the reduced gradient.
+bool WindowSolver::finish_step(double lambda, const WindowInformation& information) {
   step_.dense = -information.solve(reduced_.g);
   equations_.points.back_substitute(step_.dense, step_.landmarks);
   if (!step_.dense.allFinite()) return false;
 
   // Predicted decrease of the damped quadratic model: (dx^T D dx - g^T dx) / 2.
   double twice = lambda * step_.dense.cwiseAbs2().dot(equations_.H.diagonal()) - equations_.g.dot(step_.dense);
+  const ThirdDamping depth = depth_damping(lambda);
   for (std::size_t i = 0; i < step_.landmarks.size(); ++i) {
     const PointBlock& point = equations_.points.points()[i];
     const Vec3& d = step_.landmarks[i];
-    twice += lambda * d.cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(d) + depth_damping.of(point) * d.z() * d.z();
+    twice += lambda * d.cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(d) + depth.of(point) * d.z() * d.z();
   }
   step_.predicted_decrease = 0.5 * twice;
   step_.size = step_.dense.tail(6 * equations_.layout.frames).lpNorm<Eigen::Infinity>();
@@ -145,12 +163,18 @@ struct WindowSolver::Descent {
   }
   double predicted_decrease() const { return solver.step_.predicted_decrease; }
   double step_size() const { return solver.step_.size; }
+  bool step_again() {
+    return !solution.window.calibrating() && lambda <= kNegligibleLambda && solver.step_again(lambda, solution.information);
+  }
   double apply_step() {
+    move();
+    return solution.window.calibrating() ? cost_of(solution.window, solver.pairs_) : solver.renew_gradient(solution.window);
+  }
+  void move() {
     before.save(solution.window);
     const std::vector<PointBlock>& points = solver.equations_.points.points();
     const double scale = solver.images_show_scale_ ? 0 : common_scale(solution.window, points, solver.step_.landmarks);
-    move(solution.window, solver.equations_.layout, solver.step_, scale);
-    return cost_of(solution.window, solver.pairs_);
+    fbvins::move(solution.window, solver.equations_.layout, solver.step_, scale);
   }
   void undo_step() { before.restore(solution.window); }
 };

@@ -58,15 +58,21 @@ class WindowSolver {
   /// The parts of solve(): linearises at the window's estimate; then a damped step from there, and its factor.
   double linearise(const WindowProblem& window);
   bool step(double lambda, WindowInformation& information);
+  /// Cost and gradient at the window's estimate; then a step with that gradient and the information of the last step().
+  double renew_gradient(const WindowProblem& window);
+  bool step_again(double lambda, const WindowInformation& information);
   const WindowStep& step() const { return step_; }
   const NormalEquations& equations() const { return equations_; }
 
  private:
   struct Descent;
+  ThirdDamping depth_damping(double lambda) const;
+  bool finish_step(double lambda, const WindowInformation& information);
 
   PairTable pairs_;
   NormalEquations equations_;
   ReducedEquations reduced_;
+  WindowGradient gradient_;
   WindowStep step_;
   bool images_show_scale_ = true;  ///< of the window that was linearised
 };

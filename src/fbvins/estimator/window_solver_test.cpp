@@ -58,6 +58,33 @@ TEST(WindowSolver, ASolutionIsNoWorseThanTheStart) {
   }
 }
 
+TEST(WindowSolver, TheRenewedGradientIsThatOfALinearisation) {
+  const test::Window w = test::make_window(false);
+  PairTable pairs;
+  NormalEquations equations;
+  const double cost = linearise(w.problem, pairs, equations);
+  WindowGradient gradient;
+  EXPECT_NEAR(gradient_of(w.problem, pairs, gradient) / cost, 1, 1e-12);
+  EXPECT_LT((gradient.dense - equations.g).norm() / equations.g.norm(), 1e-12);
+  ASSERT_EQ(gradient.landmarks.size(), equations.points.points().size());
+  for (std::size_t i = 0; i < gradient.landmarks.size(); ++i) {
+    const Vec3& expected = equations.points.points()[i].w;
+    EXPECT_LT((gradient.landmarks[i] - expected).norm(), 1e-10 * (1 + expected.norm())) << i;
+  }
+}
+
+TEST(WindowSolver, MostSolvesLineariseOnce) {
+  WindowSolution anew, kept;
+  anew.window = kept.window = test::make_window(false).problem;
+  WindowSolver solver;
+  solver.solve(anew, {.max_iterations = 20, .min_decrease = 1e-3, .max_followed = 0});
+  solver.solve(kept, {.max_iterations = 20, .min_decrease = 1e-3});
+  EXPECT_LT(kept.summary.iterations, anew.summary.iterations);
+  EXPECT_NEAR(kept.summary.final_cost / anew.summary.final_cost, 1, 1e-4);
+  PairTable pairs;
+  EXPECT_NEAR(cost_of(kept.window, pairs) / anew.summary.final_cost, 1, 1e-4);
+}
+
 TEST(WindowSolver, ReusedMemoryGivesTheSameBits) {
   WindowSolution one, two;
   one.window = two.window = test::make_window(false).problem;

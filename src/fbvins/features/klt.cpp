@@ -156,8 +156,9 @@ Likeness likeness_at(const Place& place, const KltLevelTemplate& patch) {
 
 }  // namespace
 
-bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest, KltWindow window) {
-  for (int l = finest; l <= std::min(coarsest, pyramid.levels() - 1); ++l) {
+bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int last, KltWindow window) {
+  coarsest = last;
+  for (int l = finest; l <= std::min(last, pyramid.levels() - 1); ++l) {
     KltLevelTemplate& out = levels[static_cast<std::size_t>(l)];
     out.valid = false;
     const double scale = 1.0 / (1 << l);
@@ -167,8 +168,13 @@ bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int co
     klt::sample_grid(place.p - place.stride - 1, place.stride, place.fx, place.fy, grid);
     out.valid = finish_template(grid, window, out);
   }
-  for (int l = std::max(finest, pyramid.levels()); l <= coarsest; ++l) levels[static_cast<std::size_t>(l)].valid = false;
+  const int there = std::min(last + 1, std::max(finest, pyramid.levels()));
+  for (auto l = static_cast<std::size_t>(there); l < levels.size(); ++l) levels[l].valid = false;
   return levels[static_cast<std::size_t>(finest)].valid;
+}
+
+void KltTemplate::extend(const Pyramid& pyramid, const Vec2& px, int last) {
+  if (last > coarsest) (void)cut(pyramid, px, coarsest + 1, last);
 }
 
 bool KltReference::take(const Pyramid& pyramid, const Vec2& px) {

@@ -56,10 +56,13 @@ struct KltReference {
 
 struct KltTemplate {
   std::array<KltLevelTemplate, kMaxPyramidLevels> levels;
+  int coarsest = -1;  ///< level that was cut
 
-  /// Cuts the patch around `px` (level-0 pixels) from levels finest..coarsest.
+  /// Cuts the patch around `px` (level-0 pixels) from levels finest..coarsest; there are no coarser ones then.
   /// False when the feature is too close to the border or the finest patch has no texture in some direction.
   bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest, KltWindow window = KltWindow::wide);
+  /// Cuts the levels up to `coarsest` that are not there yet, from where the others are of: most are never asked for.
+  void extend(const Pyramid& pyramid, const Vec2& px, int coarsest);
   /// Level 0 from a reference: an offset d from the feature in the new image shows what the reference has at
   /// J_reference_now * d. False when the warp leaves the block or the patch has no texture.
   bool cut_warped(const KltReference& reference, const Mat2& J_reference_now);

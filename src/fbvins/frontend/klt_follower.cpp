@@ -11,8 +11,11 @@ constexpr double kSmallestScale = 0.65;
 /// Correlation with the reference below which it is replaced.
 constexpr double kMinReferenceCorrelation = 0.8;
 constexpr int kTop = kKltLevels - 1;
-/// Coarsest level where motion and depth are known, and that of the backward check.
-constexpr int kWellPredictedLevel = 2, kBackLevel = 1;
+/// Level where motion and depth are known, and that of the backward check: from two pixels away the finest one leads there.
+/// Coarser ones are cut where it does not.
+constexpr int kFinest = 0;
+/// Last step of an alignment that one to the reference follows.
+constexpr double kConvergedStart_px = 0.1;
 
 }  // namespace
 
@@ -23,12 +26,16 @@ Vec2 KltFollower::predict(const KltTrack& track, const CameraMotion& motion, dou
   return track.px + carried->b_px - carried->a_px;
 }
 
-KltResult KltFollower::align(const KltTrack& track, const KltTemplate& patch, const CameraMotion& motion,
-                             double typical_inverse_depth, const Pyramid& left) const {
+KltResult KltFollower::align(const KltTrack& track, KltTemplate& patch, const CameraMotion& motion, double typical_inverse_depth,
+                             const FrameImages& images) const {
   const Vec2 start = predict(track, motion, typical_inverse_depth);
-  const bool well_predicted = motion.has_translation && track.inverse_depth;
-  const KltResult found = klt_align(patch, left, start, well_predicted ? std::min(kTop, kWellPredictedLevel) : kTop, 0);
-  return found.ok() || !well_predicted ? found : klt_align(patch, left, start, kTop, 0);
+  const auto from_level = [&](int coarsest) {
+    patch.extend(images.before(), track.px, coarsest);
+    return klt_align(patch, images.left(), start, coarsest, kFinest, kConvergedStart_px);
+  };
+  if (motion.has_translation && track.inverse_depth)
+    if (const KltResult found = from_level(kFinest); found.ok()) return found;
+  return from_level(kTop);
 }
 
 KltResult KltFollower::align_to_reference(const KltTrack& track, const KltReference& reference, const Vec2& start_px,
@@ -43,7 +50,7 @@ KltResult KltFollower::align_to_reference(const KltTrack& track, const KltRefere
   const double scale2 = J_now_reference.determinant();
   if (!(scale2 > kSmallestScale * kSmallestScale && scale2 * kSmallestScale * kSmallestScale < 1)) return {};
   if (!warped_.cut_warped(reference, J_now_reference.inverse())) return {};
-  return klt_align(warped_, left, start_px, 0, 0);
+  return klt_align(warped_, left, start_px, kFinest, kFinest);
 }
 
 void KltFollower::set_reference(KltTrack& track, KltPatches& patches, const Pyramid& left) const {
@@ -70,9 +77,15 @@ bool KltFollower::carry(KltTrack& track, const Vec2& found_px, const CameraMotio
   return true;
 }
 
+/// Of a track that no reference confirms: whether its newest patch is found where the one before was.
+bool KltFollower::comes_back(const KltTrack& track, const KltTemplate& newest, const Pyramid& before) const {
+  const KltResult back = klt_align(newest, before, track.px, kFinest, kFinest, kConvergedCheck_px);
+  return back.ok() && (back.px - track.px).norm() <= kForwardBackward_px;
+}
+
 bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,
                          const FrameImages& images, FrontendStats& stats) {
-  KltResult found = align(track, patches.newest, motion, typical_inverse_depth, images.left());
+  KltResult found = align(track, patches.newest, motion, typical_inverse_depth, images);
   if (!found.ok()) {
     ++stats.lost_flow;
     return false;
@@ -85,12 +98,11 @@ bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotio
     return false;
   }
   if (reference_holds) found.px = to_reference.px;
-  if (!camera_.inside(found.px, kPatchBorder_px) || !patches.newest.cut(images.left(), found.px, 0, kTop)) {
+  if (!camera_.inside(found.px, kPatchBorder_px) || !patches.newest.cut(images.left(), found.px, kFinest, kFinest)) {
     ++stats.lost_flow;
     return false;
   }
-  const KltResult back = klt_align(patches.newest, images.before(), track.px, kBackLevel, 0, kConvergedCheck_px);
-  if (!back.ok() || (back.px - track.px).norm() > kForwardBackward_px) {
+  if (!reference_holds && !comes_back(track, patches.newest, images.before())) {
     ++stats.lost_check;
     return false;
   }

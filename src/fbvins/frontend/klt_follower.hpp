@@ -49,8 +49,9 @@ class KltFollower {
  private:
   Vec2 predict(const KltTrack& track, const CameraMotion& motion, double typical_inverse_depth) const;
   bool carry(KltTrack& track, const Vec2& found_px, const CameraMotion& motion) const;
-  KltResult align(const KltTrack& track, const KltTemplate& patch, const CameraMotion& motion, double typical_inverse_depth,
-                  const Pyramid& left) const;
+  KltResult align(const KltTrack& track, KltTemplate& patch, const CameraMotion& motion, double typical_inverse_depth,
+                  const FrameImages& images) const;
+  bool comes_back(const KltTrack& track, const KltTemplate& newest, const Pyramid& before) const;
   KltResult align_to_reference(const KltTrack& track, const KltReference& reference, const Vec2& start_px, const Pyramid& left);
 
   Camera camera_;

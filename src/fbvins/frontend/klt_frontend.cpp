@@ -13,6 +13,8 @@ constexpr std::uint64_t kSeed = 1;
 /// RANSAC threshold between left images KltTrack::kHistory frames apart, and the fewest tracks of that age for this check.
 constexpr double kLongEpipolar_px = 1.0;
 constexpr std::size_t kFewestForLongCheck = 12;
+/// Depths change little from image to image, and a patch that is followed looks the same in both.
+constexpr KltStereoEffort kStereo{.known_depth_level = 0, .sure_correlation = 0.9};
 
 }  // namespace
 
@@ -27,7 +29,7 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
       motion_(rig.left, baseline_for_depths_m(rig)),
       epipolar_(rig.left.focal_px(), kSeed),
       detector_(options.min_distance_px),
-      stereo_(rig, options.min_depth_m) {}
+      stereo_(rig, options.min_depth_m, kStereo) {}
 
 TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& prior) {
   TrackedFrame out;
@@ -131,7 +133,7 @@ bool KltFrontend::start_track(const Vec2& px) {
 }
 
 bool KltFrontend::cut_patches(KltTrack& track, KltPatches& patches, const Pyramid& image) const {
-  if (!patches.newest.cut(image, track.px, 0, kKltLevels - 1)) return false;
+  if (!patches.newest.cut(image, track.px, 0, 0)) return false;
   follower_.set_reference(track, patches, image);
   track.at_age(0) = track.normalised;
   return true;

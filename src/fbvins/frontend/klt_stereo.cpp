@@ -13,8 +13,6 @@ namespace {
 
 /// Level of the correlation search, and the coarsest of the alignment that follows it.
 constexpr int kSearchLevel = 2;
-/// Coarsest level of the alignment from a depth that is known.
-constexpr int kKnownDepthLevel = 1;
 constexpr int kMostSteps = 200;
 /// Correlation that the search must reach.
 constexpr double kMinSearchCorrelation = 0.6;
@@ -60,8 +58,9 @@ bool images_are_turned(const StereoRig& rig) {
 
 }  // namespace
 
-KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, double min_depth_m)
+KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, double min_depth_m, const KltStereoEffort& effort)
     : min_depth_m_(min_depth_m),
+      effort_(effort),
       camera_left_(rig.left),
       camera_right_(rig.right),
       turned_(images_are_turned(rig)),
@@ -128,6 +127,7 @@ StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_
   StereoMatch match;
   const KltResult found = klt_align(patch, right, start_px, coarsest, 0);
   if (!found.ok() || !place_in_right(found.px, left_normalised, match)) return match;
+  if (found.correlation > effort_.sure_correlation) return match;
   scratch_.cut(right, found.px, 0, 0);
   const KltResult back = klt_align(scratch_, left, left_px, 0, 0, kConvergedCheck_px);
   if (!back.ok() || (back.px - left_px).norm() > kForwardBackward_px) match.failure = StereoFailure::check;
@@ -140,11 +140,12 @@ StereoMatch KltStereoMatcher::match(const KltTemplate& patch, const Vec2& left_p
   StereoMatch match;
   if (inverse_depth) {
     if (const auto start = project(left_normalised, *inverse_depth))
-      match = refine(patch, left_px, left_normalised, *start, kKnownDepthLevel, left, right);
+      match = refine(patch, left_px, left_normalised, *start, effort_.known_depth_level, left, right);
     if (match.failure == StereoFailure::none) return match;
   }
-  if (const auto start = search(patch, left_normalised, right))
-    match = refine(patch, left_px, left_normalised, *start, kSearchLevel, left, right);
+  whole_.cut(left, left_px, 0, kSearchLevel);
+  if (const auto start = search(whole_, left_normalised, right))
+    match = refine(whole_, left_px, left_normalised, *start, kSearchLevel, left, right);
   return match;
 }
 

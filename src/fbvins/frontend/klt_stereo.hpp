@@ -33,10 +33,16 @@ struct StereoMatch {
   StereoFailure failure = StereoFailure::flow;
 };
 
+/// What a frontend can do without.
+struct KltStereoEffort {
+  int known_depth_level = 1;    ///< coarsest level of the alignment from a depth that is known
+  double sure_correlation = 2;  ///< a match that correlates by more is not followed back into the left image; 2: all are
+};
+
 class KltStereoMatcher {
  public:
   /// `min_depth_m`: smallest depth that is searched for in the right image.
-  KltStereoMatcher(const StereoRig& rig, double min_depth_m);
+  KltStereoMatcher(const StereoRig& rig, double min_depth_m, const KltStereoEffort& effort = {});
 
   /// Between the images that are matched next.
   void place(const Pose<C1, C0>& T_C1C0);
@@ -60,12 +66,13 @@ class KltStereoMatcher {
   StereoFailure check_geometry(const Vec2& left_normalised, StereoMatch& match) const;
 
   double min_depth_m_;
+  KltStereoEffort effort_;
   Camera camera_left_, camera_right_;
   bool turned_;
   Mat3 R_rl_;  // C1 <- C0
   Vec3 p_rl_;
   double focal_px_;
-  KltTemplate scratch_;
+  KltTemplate scratch_, whole_;
   PatchRefiner refiner_;
 };
 

@@ -22,20 +22,25 @@ struct Matrix {
   double* inverse_diagonal;
 };
 
-/// L in rows i .. i + 3 and columns k .. k + 7, from the finished columns `first` .. k - 1. False without a positive pivot.
-FBVINS_KERNEL bool make_panel(const Matrix& m, int i, int k, int first, int rows) {
-  Lanes a[kRows];
-  for (int r = 0; r < kRows; ++r)
-    for (int c = 0; c < kLanes; ++c) a[r][c] = m.L[(k + c) * m.stride + i + r];
-  for (int j = first; j < k; ++j) {
-    const double* column = m.L + j * m.stride;
+/// The rest of a panel that lies below the diagonal, column by column.
+FBVINS_INLINE void finish_below(const Matrix& m, int i, int k, Lanes (&a)[kRows]) {
+#pragma GCC unroll 8
+  for (int c = 0; c < kLanes; ++c) {
+    double* column = m.L + (k + c) * m.stride;
     Lanes v;
     load(column + k, v);
-    for (int r = 0; r < kRows; ++r) a[r] -= column[i + r] * v;
+    for (int r = 0; r < kRows; ++r) {
+      column[i + r] = a[r][c] * m.inverse_diagonal[k + c];
+      a[r] -= column[i + r] * v;
+    }
   }
+}
+
+/// The rest of a panel that the diagonal crosses. False without a positive pivot.
+FBVINS_INLINE bool finish_across(const Matrix& m, int i, int k, int rows, Lanes (&a)[kRows]) {
   for (int c = 0; c < kLanes && k + c < i + rows; ++c) {
     double* column = m.L + (k + c) * m.stride;
-    if (const int r = k + c - i; r >= 0) {  // on the diagonal
+    if (const int r = k + c - i; r >= 0) {
       const double d = a[r][c];
       if (!(d > 0) || !std::isfinite(d)) return false;
       column[k + c] = std::sqrt(d);
@@ -47,6 +52,27 @@ FBVINS_KERNEL bool make_panel(const Matrix& m, int i, int k, int first, int rows
     for (int r = std::max(0, k + c + 1 - i); r < kRows; ++r) a[r] -= column[i + r] * v;
   }
   return true;
+}
+
+/// L in rows i .. i + 3 and columns k .. k + 7, from the finished columns `first` .. k - 1. False without a positive pivot.
+/// Two copies of the rows: the one that only loops of fixed length touch stays in registers.
+FBVINS_KERNEL bool make_panel(const Matrix& m, int i, int k, int first, int rows) {
+  Lanes a[kRows];
+  for (int r = 0; r < kRows; ++r)
+    for (int c = 0; c < kLanes; ++c) a[r][c] = m.L[(k + c) * m.stride + i + r];
+  for (int j = first; j < k; ++j) {
+    const double* column = m.L + j * m.stride;
+    Lanes v;
+    load(column + k, v);
+    for (int r = 0; r < kRows; ++r) a[r] -= column[i + r] * v;
+  }
+  if (k + kLanes <= i) {
+    finish_below(m, i, k, a);
+    return true;
+  }
+  Lanes crossed[kRows];
+  for (int r = 0; r < kRows; ++r) crossed[r] = a[r];
+  return finish_across(m, i, k, rows, crossed);
 }
 
 FBVINS_KERNEL void subtract_column(const double* column, double factor, int from, int to, double* x) {

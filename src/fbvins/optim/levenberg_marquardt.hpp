@@ -9,11 +9,15 @@
 //     double step_size() const;           // some norm of the last step, compared with min_step
 //     double apply_step();                // moves the estimate; returns the new cost
 //     void undo_step();
+//
+//     bool step_again();                  // where there are these two, steps are made with the information of the last
+//     void move();                        // linearisation and the gradient at the estimate (follow())
 //   };
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 
 namespace fbvins {
 
@@ -29,15 +33,49 @@ struct LmOptions {
   /// cost has no meaningful zero; 0.05 is a third of a sigma along one direction. Also converged when the decrease
   /// differs from the predicted one by less than this: the quadratic model is accurate there, and so is its minimum.
   double min_decrease = 0.05;
+  int max_followed = 3;  ///< steps with the information of one linearisation, beside its own, of a problem that KeepsInformation
 };
 
 struct LmSummary {
   int iterations = 0;  ///< linearisations
+  int followed = 0;    ///< steps with the information of an earlier one
   int rejected = 0;    ///< steps taken back
   double initial_cost = 0;
   double final_cost = 0;
   bool usable = true;  ///< false if no step could be computed or the cost is not finite
 };
+
+/// A linearisation serves for several steps: apply_step() finds the gradient beside the cost, and step_again() makes a step of it
+/// and of the information as it was, or says that it cannot. Far cheaper than a linearisation, and as good near the minimum.
+template <class Problem>
+concept KeepsInformation = requires(Problem problem) {
+  { problem.step_again() } -> std::same_as<bool>;
+  problem.move();  // the step that was solved last, without evaluating
+};
+
+/// Steps with the information of the last linearisation. True where they converged; false where another is needed.
+template <KeepsInformation Problem>
+bool follow(Problem& problem, const LmOptions& options, LmSummary& summary) {
+  for (int i = 0; i < options.max_followed; ++i) {
+    if (!problem.step_again()) return false;
+    const double predicted = problem.predicted_decrease();
+    if (predicted < options.min_decrease || problem.step_size() < options.min_step) {
+      problem.move();
+      summary.final_cost -= predicted;
+      return true;
+    }
+    ++summary.followed;
+    const double decrease = summary.final_cost - problem.apply_step();
+    if (!(decrease > 0.5 * predicted)) {
+      problem.undo_step();
+      ++summary.rejected;
+      return false;
+    }
+    summary.final_cost -= decrease;
+    if (std::abs(predicted - decrease) < options.min_decrease) return true;
+  }
+  return false;
+}
 
 template <class Problem>
 LmSummary minimise(Problem& problem, const LmOptions& options) {
@@ -76,6 +114,8 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
       return summary;
     }
     if (converged || decrease < options.min_decrease || std::abs(predicted - decrease) < options.min_decrease) return summary;
+    if constexpr (KeepsInformation<Problem>)
+      if (follow(problem, options, summary)) return summary;
   }
   return summary;
 }

@@ -59,6 +59,42 @@ TEST(LevenbergMarquardt, NeverEndsWorseThanItBegan) {
   }
 }
 
+/// Steps again with the information of the last linearisation.
+struct Keeping : Rosenbrock {
+  bool step_again() {
+    Eigen::Matrix2d J;
+    J << -1, 0, -20 * x(0), 10;
+    g = J.transpose() * residual();
+    step = -(H + Eigen::Matrix2d(d.asDiagonal())).ldlt().solve(g);
+    return step.allFinite();
+  }
+  void move() {
+    saved = x;
+    x += step;
+  }
+};
+
+TEST(LevenbergMarquardt, StepsWithKeptInformationEndAtTheSameMinimum) {
+  Keeping problem;
+  problem.x = {0.9, 0.85};
+  const LmSummary summary =
+      minimise(problem, {.max_iterations = 100, .initial_lambda = 1e-9, .min_step = 1e-12, .min_decrease = 0});
+  EXPECT_TRUE(summary.usable);
+  EXPECT_LT((problem.x - Eigen::Vector2d(1, 1)).norm(), 1e-6);
+  EXPECT_GT(summary.followed, 0);
+}
+
+TEST(LevenbergMarquardt, ANegligibleStepIsMadeWithoutEvaluatingIt) {
+  struct Counting : Keeping {
+    int evaluated = 0;
+    double apply_step() { return ++evaluated, Keeping::apply_step(); }
+  } problem;
+  problem.x = {0.9, 0.85};
+  const LmSummary summary = minimise(problem, {.max_iterations = 10, .initial_lambda = 1e-9, .min_decrease = 1e-3});
+  EXPECT_EQ(problem.evaluated, summary.iterations + summary.followed);
+  EXPECT_NEAR(problem.cost(), summary.final_cost, 1e-3);
+}
+
 struct Broken : Rosenbrock {
   double linearise() { return std::numeric_limits<double>::quiet_NaN(); }
 };

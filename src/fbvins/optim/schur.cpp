@@ -2,34 +2,59 @@
 #include "fbvins/optim/schur.hpp"
 
 #include <Eigen/LU>
+#include <cstring>
 
 #include "fbvins/core/simd.hpp"
 
 namespace fbvins {
 namespace {
 
+using Four = double __attribute__((vector_size(32)));
+using Two = double __attribute__((vector_size(16)));
+
+/// Columns of H that one pass over W V^-1 serves.
+constexpr int kColumns = 3;
+
+/// out -= y w^T in as many rows as lanes and kColumns columns; y has three columns `length` apart.
+template <class Lanes>
+FBVINS_INLINE void subtract_rows(const double* y, std::ptrdiff_t length, const double* w, double* out, std::ptrdiff_t ld) {
+  Lanes y0, y1, y2, x;
+  std::memcpy(&y0, y, sizeof(y0));
+  std::memcpy(&y1, y + length, sizeof(y1));
+  std::memcpy(&y2, y + 2 * length, sizeof(y2));
+  for (int c = 0; c < kColumns; ++c) {
+    std::memcpy(&x, out + c * ld, sizeof(x));
+    x -= y0 * w[3 * c] + y1 * w[3 * c + 1] + y2 * w[3 * c + 2];
+    std::memcpy(out + c * ld, &x, sizeof(x));
+  }
+}
+
 /// Subtracts W_k V^-1 W_l^T for all pairs of one point's blocks from the lower triangle of H.
 /// y is W V^-1 (6 count x 3), w is W^T (3 x 6 count), both column-major.
 FBVINS_KERNEL void subtract_outer_products(double* H, std::ptrdiff_t ld, const int* offsets, int count, const double* y,
                                            const double* w) {
   const int length = 6 * count;
-  const double* y0 = y;
-  const double* y1 = y + length;
-  const double* y2 = y + 2 * length;
   for (int b = 0; b < count; ++b) {
-    for (int j = 0; j < 6; ++j) {
-      const double w0 = w[18 * b + 3 * j], w1 = w[18 * b + 3 * j + 1], w2 = w[18 * b + 3 * j + 2];
-      double* column = H + (offsets[b] + j) * ld;
-      for (int a = b; a < count;) {
-        int end = a + 1;  // blocks that are adjacent in the system are done in one long run
-        while (end < count && offsets[end] == offsets[end - 1] + 6) ++end;
-        double* out = column + offsets[a];
-        const int begin = 6 * a, n = 6 * (end - a);
-        for (int i = 0; i < n; ++i) out[i] -= y0[begin + i] * w0 + y1[begin + i] * w1 + y2[begin + i] * w2;
-        a = end;
+    for (int a = b; a < count;) {
+      int end = a + 1;  // blocks that are adjacent in the system are done in one long run
+      while (end < count && offsets[end] == offsets[end - 1] + 6) ++end;
+      const int n = 6 * (end - a), whole = n / 4 * 4;
+      for (int j = 0; j < 6; j += kColumns) {
+        double* out = H + (offsets[b] + j) * ld + offsets[a];
+        const double *of_run = y + 6 * a, *of_columns = w + 18 * b + 3 * j;
+        for (int i = 0; i < whole; i += 4) subtract_rows<Four>(of_run + i, length, of_columns, out + i, ld);
+        if (whole < n) subtract_rows<Two>(of_run + whole, length, of_columns, out + whole, ld);
       }
+      a = end;
     }
   }
+}
+
+/// y = W V^-1 (rows x 3), column-major, from w = W^T (3 x rows).
+FBVINS_KERNEL void times_inverse(const double* w, int rows, const double* V_inverse, double* y) {
+  for (int c = 0; c < 3; ++c)
+    for (int i = 0; i < rows; ++i)
+      y[c * rows + i] = w[3 * i] * V_inverse[3 * c] + w[3 * i + 1] * V_inverse[3 * c + 1] + w[3 * i + 2] * V_inverse[3 * c + 2];
 }
 
 }  // namespace
@@ -63,13 +88,22 @@ bool PointBlocks::eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& 
     const double* W = coupling_.data() + 18 * point.first;
     const int* offsets = offsets_.data() + point.first;
     const Eigen::Vector3d v_inv_w = point.V_inverse * point.w;
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3>> Y(scratch_.data(), 6 * n, 3);
     const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>> WT(W, 3, 6 * n);
-    Y.noalias() = WT.transpose() * point.V_inverse;
+    times_inverse(W, 6 * n, point.V_inverse.data(), scratch_.data());
     for (int k = 0; k < n; ++k) g.segment<6>(offsets[k]).noalias() -= WT.middleCols<6>(6 * k).transpose() * v_inv_w;
     subtract_outer_products(H.data(), H.outerStride(), offsets, n, scratch_.data(), W);
   }
   return true;
+}
+
+void PointBlocks::eliminate_gradient(Eigen::VectorXd& g) const {
+  for (const PointBlock& point : points_) {
+    const Eigen::Vector3d v_inv_w = point.V_inverse * point.w;
+    for (int k = 0; k < point.count; ++k) {
+      const Eigen::Map<const Eigen::Matrix<double, 3, 6>> WT(coupling_.data() + 18 * (point.first + k));
+      g.segment<6>(offsets_[point.first + k]).noalias() -= WT.transpose() * v_inv_w;
+    }
+  }
 }
 
 void PointBlocks::back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const {

@@ -50,6 +50,8 @@ class PointBlocks {
   /// V is damped by lambda times its diagonal, its third element by `third` as well. False if some V is not
   /// positive definite.
   bool eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, const ThirdDamping& third = {});
+  /// Subtracts W_k V^-1 w of every point from g, with the V^-1 of eliminate().
+  void eliminate_gradient(Eigen::VectorXd& g) const;
   /// The step of each point for a step of the dense system: dx = -V^-1 (w + sum W_k^T dx_k), with the V^-1 that
   /// eliminate() damped.
   void back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const;
