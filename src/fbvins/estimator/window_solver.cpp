@@ -163,8 +163,10 @@ struct WindowSolver::Descent {
   }
   double predicted_decrease() const { return solver.step_.predicted_decrease; }
   double step_size() const { return solver.step_.size; }
+  /// One camera's scale is so weakly known that its information changes with each step.
   bool step_again() {
-    return !solution.window.calibrating() && lambda <= kNegligibleLambda && solver.step_again(lambda, solution.information);
+    return solver.images_show_scale_ && !solution.window.calibrating() && lambda <= kNegligibleLambda &&
+           solver.step_again(lambda, solution.information);
   }
   double apply_step() {
     move();

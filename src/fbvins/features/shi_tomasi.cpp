@@ -12,8 +12,6 @@ namespace {
 
 constexpr int kWindow = 7;  // side of the structure tensor's window
 constexpr int kHalf = kWindow / 2;
-constexpr int kFewestCells = 24;             // searched each time, if as many are empty and corners are wanted
-constexpr int kCellsPerCorner = 2;           // searched where fewer are
 constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is searched
 constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not give enough
 constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
@@ -176,8 +174,9 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   // From where the last search stopped, so that every cell has its turn.
   int& next = next_cell_[empty ? 0 : 1];
   const int cells = static_cast<int>(occupancy_.size());
-  const int budget =
-      existing.size() < kTooFewFeatures ? cells : std::max(std::min(kFewestCells, kCellsPerCorner * wanted), empty ? wanted : 0);
+  const int budget = existing.size() < kTooFewFeatures
+                         ? cells
+                         : std::max(std::min(kFewestCells, cells_per_corner_ * wanted), empty ? wanted : 0);
   // Features close together are better than too few.
   const double distance_px = (empty ? 1.0 : kCrowding) * min_distance_px_;
   int searched = 0;

@@ -28,9 +28,12 @@ double estimate_noise(const PyramidLevel& image);
 
 class ShiTomasiDetector {
  public:
-  /// `min_distance_px`: between features; cells, each of which is to have one, have twice that side.
-  explicit ShiTomasiDetector(double min_distance_px)
-      : min_distance_px_(min_distance_px), cell_px_(static_cast<int>(2 * min_distance_px)) {}
+  static constexpr int kFewestCells = 24;  ///< searched each time, if as many are empty and corners are wanted
+
+  /// `min_distance_px`: between features; cells, each of which is to have one, have twice that side. `cells_per_corner`: searched
+  /// for each corner that is wanted, where that is less than otherwise.
+  explicit ShiTomasiDetector(double min_distance_px, int cells_per_corner = kFewestCells)
+      : min_distance_px_(min_distance_px), cell_px_(static_cast<int>(2 * min_distance_px)), cells_per_corner_(cells_per_corner) {}
 
   int cell_px() const { return cell_px_; }
 
@@ -55,6 +58,7 @@ class ShiTomasiDetector {
 
   double min_distance_px_;
   int cell_px_;
+  int cells_per_corner_;
   double noise_ = 0;
   int next_cell_[2] = {-1, -1};        // where the searches of empty and of occupied cells stopped
   std::vector<Corner> corners_;        // accepted

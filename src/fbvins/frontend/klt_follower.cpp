@@ -11,11 +11,7 @@ constexpr double kSmallestScale = 0.65;
 /// Correlation with the reference below which it is replaced.
 constexpr double kMinReferenceCorrelation = 0.8;
 constexpr int kTop = kKltLevels - 1;
-/// Level where motion and depth are known, and that of the backward check: from two pixels away the finest one leads there.
-/// Coarser ones are cut where it does not.
 constexpr int kFinest = 0;
-/// Last step of an alignment that one to the reference follows.
-constexpr double kConvergedStart_px = 0.1;
 
 }  // namespace
 
@@ -31,10 +27,10 @@ KltResult KltFollower::align(const KltTrack& track, KltTemplate& patch, const Ca
   const Vec2 start = predict(track, motion, typical_inverse_depth);
   const auto from_level = [&](int coarsest) {
     patch.extend(images.before(), track.px, coarsest);
-    return klt_align(patch, images.left(), start, coarsest, kFinest, kConvergedStart_px);
+    return klt_align(patch, images.left(), start, coarsest, kFinest, effort_.converged_px);
   };
   if (motion.has_translation && track.inverse_depth)
-    if (const KltResult found = from_level(kFinest); found.ok()) return found;
+    if (const KltResult found = from_level(effort_.predicted_level); found.ok()) return found;
   return from_level(kTop);
 }
 
@@ -77,9 +73,9 @@ bool KltFollower::carry(KltTrack& track, const Vec2& found_px, const CameraMotio
   return true;
 }
 
-/// Of a track that no reference confirms: whether its newest patch is found where the one before was.
+/// Whether a track's newest patch is found where the one before was.
 bool KltFollower::comes_back(const KltTrack& track, const KltTemplate& newest, const Pyramid& before) const {
-  const KltResult back = klt_align(newest, before, track.px, kFinest, kFinest, kConvergedCheck_px);
+  const KltResult back = klt_align(newest, before, track.px, effort_.back_level, kFinest, kConvergedCheck_px);
   return back.ok() && (back.px - track.px).norm() <= kForwardBackward_px;
 }
 
@@ -98,11 +94,11 @@ bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotio
     return false;
   }
   if (reference_holds) found.px = to_reference.px;
-  if (!camera_.inside(found.px, kPatchBorder_px) || !patches.newest.cut(images.left(), found.px, kFinest, kFinest)) {
+  if (!camera_.inside(found.px, kPatchBorder_px) || !patches.newest.cut(images.left(), found.px, kFinest, effort_.back_level)) {
     ++stats.lost_flow;
     return false;
   }
-  if (!reference_holds && !comes_back(track, patches.newest, images.before())) {
+  if ((effort_.always_back || !reference_holds) && !comes_back(track, patches.newest, images.before())) {
     ++stats.lost_check;
     return false;
   }

@@ -3,7 +3,7 @@
 // the patch with which it began (its reference), and a forward-backward check.
 // Holds scratch memory; one instance, one thread.
 //
-//   KltFollower follower(camera);
+//   KltFollower follower(camera, kFollowedByPair);
 //   if (!follower.follow(track, patches, motion, typical_inverse_depth, images, stats)) track.status = TrackStatus::lost;
 #pragma once
 
@@ -36,9 +36,20 @@ struct KltPatches {
   KltReference reference;
 };
 
+/// What is done for each track.
+struct KltFollowEffort {
+  int predicted_level = 2;              ///< coarsest level where motion and depth are known
+  int back_level = 1;                   ///< coarsest level of the backward check
+  bool always_back = true;              ///< else only of tracks that no reference confirms
+  double converged_px = kConverged_px;  ///< last step of an alignment
+};
+/// With a second camera, which checks each track as well: from two pixels away the finest level leads there, and the alignment to
+/// the reference that follows is exact. One camera alone restarts more often with it (docs/experiments/speed.md).
+inline constexpr KltFollowEffort kFollowedByPair{0, 0, false, 0.1};
+
 class KltFollower {
  public:
-  explicit KltFollower(const Camera& camera) : camera_(camera) {}
+  KltFollower(const Camera& camera, const KltFollowEffort& effort) : camera_(camera), effort_(effort) {}
 
   /// False when it is lost.
   bool follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,
@@ -55,6 +66,7 @@ class KltFollower {
   KltResult align_to_reference(const KltTrack& track, const KltReference& reference, const Vec2& start_px, const Pyramid& left);
 
   Camera camera_;
+  KltFollowEffort effort_;
   KltTemplate warped_;  // of the reference being used
 };
 

@@ -13,6 +13,8 @@ constexpr std::uint64_t kSeed = 1;
 /// RANSAC threshold between left images KltTrack::kHistory frames apart, and the fewest tracks of that age for this check.
 constexpr double kLongEpipolar_px = 1.0;
 constexpr std::size_t kFewestForLongCheck = 12;
+/// With a second camera; one camera alone restarts more often with so few (docs/experiments/speed.md).
+constexpr int kCellsPerCorner = 2;
 /// Depths change little from image to image, and a patch that is followed looks the same in both.
 constexpr KltStereoEffort kStereo{.known_depth_level = 0, .sure_correlation = 0.9};
 
@@ -25,10 +27,10 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
       images_(rig, kKltLevels),
       predictor_(rig.T_BC0),
       tracks_(options.max_features),
-      follower_(rig.left),
+      follower_(rig.left, rig.has_right() ? kFollowedByPair : KltFollowEffort{}),
       motion_(rig.left, baseline_for_depths_m(rig)),
       epipolar_(rig.left.focal_px(), kSeed),
-      detector_(options.min_distance_px),
+      detector_(options.min_distance_px, rig.has_right() ? kCellsPerCorner : ShiTomasiDetector::kFewestCells),
       stereo_(rig, options.min_depth_m, kStereo) {}
 
 TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& prior) {

@@ -28,7 +28,7 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       T_C1C0_(rig.T_C1C0()),
       images_(rig, kOrbAlignmentLevels),
       predictor_(rig.T_BC0),
-      describer_(extraction(options), stage),
+      describer_(extraction(options), stage, !rig.has_right()),
       improver_(std::move(stage)),
       tracks_(options.max_features + kMostUnobserved),
       matcher_(options.search_px),

@@ -36,12 +36,9 @@ const std::vector<int>& OrbTrackMatcher::match(OrbTracks& tracks, OrbView& view,
   improved_ = view.improves;
   if (improved_) improver.improve(tracks, view, [](const OrbTrack& track) { return !track.observed; });
   ask(tracks, well_predicted);
-  if (improved_) {
-    match_raw(tracks, view);
-    match_improved(tracks, view, improver);
-  } else {
-    matcher_.match(queries_, view.comparable(), view.grid, found_);
-  }
+  if (improved_) match_raw(tracks, view);
+  if (improved_ && !view.all_improved) match_improved(tracks, view, improver);
+  else matcher_.match(queries_, view.comparable(), view.grid, found_);
   collect(tracks, view, found_, matches_);
   stats.matches.found = static_cast<int>(matches_.size());
   stats.raw_matches.found = static_cast<int>((improved_ ? raw_matches_ : matches_).size());

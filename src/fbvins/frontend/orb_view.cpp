@@ -10,10 +10,15 @@ double OrbDescriber::describe(const ImageView& image, OrbView& view, const Mask*
   view.improves = stage_->changes_descriptors();
   double ms = 0;
   if (view.improves) {
-    view.descriptors = view.features.descriptors;
-    view.improved.assign(view.features.size(), 0);
+    view.all_improved = all_;
+    view.improved.assign(view.features.size(), all_ ? 1 : 0);
     CpuTimer timer;
     stage_->look_at(image.width, image.height, view.features, view.context);
+    view.descriptors = view.features.descriptors;
+    if (all_) {
+      stage_->improve(image.width, image.height, view.features);
+      view.descriptors.swap(view.features.descriptors);
+    }
     ms = timer.lap_ms();
   }
   view.grid.build(image.width, image.height, view.features.keypoints);

@@ -25,7 +25,8 @@ struct OrbView {
   Time t;
   std::optional<Pose<G, C0>> T_GC;      ///< predicted; none without a state of the estimator
   OrbFeatures features;                 ///< as extracted
-  bool improves = false;                ///< whether descriptors are improved; the next three are of use only then
+  bool improves = false;                ///< whether descriptors are improved; the next four are of use only then
+  bool all_improved = false;            ///< already, of all keypoints
   ImageContext context;                 ///< of the last image of which keypoints were detected
   std::vector<Descriptor> descriptors;  ///< of the keypoints: improved, or as extracted
   std::vector<std::uint8_t> improved;   ///< for each keypoint, whether its descriptor is improved
@@ -46,8 +47,9 @@ struct OrbView {
 
 class OrbDescriber {
  public:
-  OrbDescriber(const OrbOptions& options, std::shared_ptr<DescriptorStage> stage)
-      : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()) {}
+  /// `all`: improves all descriptors at once, as one camera needs (docs/experiments/speed.md).
+  OrbDescriber(const OrbOptions& options, std::shared_ptr<DescriptorStage> stage, bool all = false)
+      : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()), all_(all) {}
 
   /// Fills all of the view that depends on the image alone, and on its camera's mask. Returns the CPU time that the stage took,
   /// ms.
@@ -56,6 +58,7 @@ class OrbDescriber {
  private:
   std::shared_ptr<DescriptorStage> stage_;
   OrbExtractor extractor_;
+  bool all_;
 };
 
 }  // namespace fbvins
