@@ -13,27 +13,11 @@ namespace fbvins {
 namespace {
 
 constexpr int kBlock = kFastBlock;
-using U8x32 = std::uint8_t __attribute__((vector_size(kBlock)));
+using Bytes = std::uint8_t __attribute__((vector_size(kBlock)));
 
-FBVINS_INLINE void load(const std::uint8_t* p, U8x32& v) { std::memcpy(&v, p, sizeof(v)); }
-FBVINS_INLINE void smaller(const U8x32& a, const U8x32& b, U8x32& out) { out = a < b ? a : b; }
-FBVINS_INLINE void larger(const U8x32& a, const U8x32& b, U8x32& out) { out = a > b ? a : b; }
-
-/// max over the 16 arcs of the min over their 9 members. The arcs from k and from k + 1 share the eight
-/// members k+1 .. k+8, so their minimum is built once for both.
-FBVINS_INLINE void strongest_arc(const U8x32 (&d)[16], U8x32& best) {
-  U8x32 two[8], four[8];
-  for (int i = 0; i < 8; ++i) smaller(d[2 * i + 1], d[(2 * i + 2) & 15], two[i]);
-  for (int i = 0; i < 8; ++i) smaller(two[i], two[(i + 1) & 7], four[i]);
-  best = U8x32{};
-  for (int i = 0; i < 8; ++i) {
-    U8x32 eight, end;
-    smaller(four[i], four[(i + 2) & 7], eight);
-    larger(d[2 * i], d[(2 * i + 9) & 15], end);
-    smaller(eight, end, eight);
-    larger(best, eight, best);
-  }
-}
+FBVINS_INLINE void load(const std::uint8_t* p, Bytes& v) { std::memcpy(&v, p, sizeof(v)); }
+FBVINS_INLINE void smaller(const Bytes& a, const Bytes& b, Bytes& out) { out = a < b ? a : b; }
+FBVINS_INLINE void larger(const Bytes& a, const Bytes& b, Bytes& out) { out = a > b ? a : b; }
 
 /// The sixteen pixels around the centre, clockwise from above it.
 struct Circle {
@@ -43,45 +27,82 @@ struct Circle {
            3 * stride,  3 * stride - 1,  2 * stride - 2,  stride - 3,  -3, -stride - 3, -2 * stride - 2, -3 * stride - 1} {}
 };
 
-/// How much brighter and how much darker than the centre.
-FBVINS_INLINE void differ(const std::uint8_t* at, const U8x32& c, U8x32& bright, U8x32& dark) {
-  U8x32 p, hi, lo;
-  load(at, p);
-  larger(p, c, hi);
-  smaller(p, c, lo);
-  bright = hi - c;
-  dark = c - lo;
-}
-
-FBVINS_INLINE void strength_of_block(const std::uint8_t* centre, const Circle& circle, U8x32& best) {
-  U8x32 c, bright[16], dark[16], best_dark;
-  load(centre, c);
-  for (int i = 0; i < 16; ++i) differ(centre + circle.at[i], c, bright[i], dark[i]);
-  strongest_arc(bright, best);
-  strongest_arc(dark, best_dark);
-  larger(best, best_dark, best);
-}
-
-/// An upper bound of the strengths: each arc of nine holds at least one of two opposite pixels, here `first` or `first` + 8, and
-/// `first` + 4 or `first` + 12.
-FBVINS_INLINE void bound_of_block(const std::uint8_t* centre, const Circle& circle, int first, U8x32& bound) {
-  U8x32 c, bright[4], dark[4];
-  load(centre, c);
-  for (int i = 0; i < 4; ++i) differ(centre + circle.at[first + 4 * i], c, bright[i], dark[i]);
-  for (int i = 0; i < 2; ++i) {
-    larger(bright[i], bright[i + 2], bright[i]);
-    larger(dark[i], dark[i + 2], dark[i]);
+/// The seven rows that a pixel's circle lies in.
+struct Rows {
+  const std::uint8_t* at[7];
+  Rows(const std::uint8_t* centre, std::ptrdiff_t stride) {
+    for (int i = 0; i < 7; ++i) at[i] = centre + (i - 3) * stride;
   }
-  smaller(bright[0], bright[1], bright[0]);
-  smaller(dark[0], dark[1], dark[0]);
-  larger(bright[0], dark[0], bound);
+};
+
+/// The sixteen pixels around the centre, clockwise from above it.
+constexpr int kRight[16] = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
+constexpr int kDown[16] = {-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3};
+
+FBVINS_INLINE void load_circle(const Rows& rows, int x, Bytes (&p)[16]) {
+#pragma GCC unroll 16
+  for (int i = 0; i < 16; ++i) load(rows.at[3 + kDown[i]] + x + kRight[i], p[i]);
 }
 
-FBVINS_INLINE bool exceeds(const U8x32& v, std::uint8_t limit) {
-  const U8x32 more = v > limit ? v : U8x32{};
-  std::uint64_t words[4];
-  std::memcpy(words, &more, sizeof(words));
-  return (words[0] | words[1] | words[2] | words[3]) != 0;
+/// Of the brightest arc the darkest pixel, or, with `Dark`, of the darkest arc the brightest: over the 16 arcs of 9 pixels. The
+/// four arcs from k to k + 3 share the six members k+3 .. k+8, whose extreme is built once for them, and two of them two more
+/// each.
+template <bool Dark>
+FBVINS_INLINE void best_arc(const Bytes (&p)[16], Bytes& best) {
+  const auto worse = [](const Bytes& a, const Bytes& b, Bytes& out) __attribute__((always_inline)) {
+    Dark ? larger(a, b, out) : smaller(a, b, out);
+  };
+  const auto better = [](const Bytes& a, const Bytes& b, Bytes& out) __attribute__((always_inline)) {
+    Dark ? smaller(a, b, out) : larger(a, b, out);
+  };
+  Bytes two[8];  // from 2i + 1 on
+#pragma GCC unroll 8
+  for (int i = 0; i < 8; ++i) worse(p[2 * i + 1], p[(2 * i + 2) & 15], two[i]);
+#pragma GCC unroll 4
+  for (int k = 0; k < 16; k += 4) {
+    Bytes six, first, last;
+    worse(two[k / 2 + 1], two[(k / 2 + 2) & 7], six);
+    worse(six, two[(k / 2 + 3) & 7], six);
+    better(p[k], p[(k + 9) & 15], first);  // arcs from k and k + 1
+    worse(first, two[k / 2], first);
+    better(p[k + 2], p[(k + 11) & 15], last);  // arcs from k + 2 and k + 3
+    worse(last, two[(k / 2 + 4) & 7], last);
+    better(first, last, first);
+    worse(six, first, six);
+    if (k == 0) best = six;
+    else better(best, six, best);
+  }
+}
+
+/// How much an arc is brighter or darker than the centre, whose extremes these are.
+FBVINS_INLINE void difference(const Bytes& centre, const Bytes& bright, const Bytes& dark, Bytes& out) {
+  Bytes above, below;
+  larger(bright, centre, above);
+  smaller(dark, centre, below);
+  above -= centre;
+  below = centre - below;
+  larger(above, below, out);
+}
+
+FBVINS_INLINE void strength_of_block(const Rows& rows, int x, Bytes& strength) {
+  Bytes c, p[16], bright, dark;
+  load_circle(rows, x, p);
+  best_arc<false>(p, bright);
+  best_arc<true>(p, dark);
+  load(rows.at[3] + x, c);
+  difference(c, bright, dark, strength);
+}
+
+FBVINS_INLINE bool exceeds(const Bytes& v, const std::uint8_t* limits) {
+  Bytes limit, most;
+  load(limits, limit);
+  larger(v, limit, most);
+  most -= limit;
+  using Half = std::uint64_t __attribute__((vector_size(16)));
+  Half halves[kBlock / 16];
+  std::memcpy(halves, &most, sizeof(halves));
+  for (int i = 1; i < kBlock / 16; ++i) halves[0] |= halves[i];
+  return (halves[0][0] | halves[0][1]) != 0;
 }
 
 /// Few pixels remain: eight at a time are tested as one integer.
@@ -90,6 +111,7 @@ void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector
   for (int block = 0; block < count; block += 8) {
     std::uint64_t eight;
     std::memcpy(&eight, kept + block, sizeof(eight));
+    if (count - block < 8) eight &= (std::uint64_t{1} << (8 * (count - block))) - 1;
     while (eight != 0) {
       const int k = std::countr_zero(eight) / 8;
       out.push_back(
@@ -102,45 +124,34 @@ void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector
 }  // namespace
 
 FBVINS_KERNEL
-void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t* strength) {
-  const Circle circle(stride);
+void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, const std::uint8_t* limits,
+                       std::uint8_t* strength, std::uint8_t* found) {
+  const Rows rows(centre, stride);
   for (int x = 0; x < count; x += kBlock) {
-    U8x32 best;
-    strength_of_block(centre + x, circle, best);
-    std::memcpy(strength + x, &best, sizeof(best));
-  }
-}
-
-FBVINS_KERNEL
-void fast_strength_row_above(const std::uint8_t* centre, std::ptrdiff_t stride, int count, const std::uint8_t* limits,
-                             std::uint8_t* strength) {
-  const Circle circle(stride);
-  for (int x = 0; x < count; x += kBlock) {
-    U8x32 best{}, bound;
-    const std::uint8_t limit = limits[x / kBlock];
-    bound_of_block(centre + x, circle, 0, bound);
-    if (exceeds(bound, limit)) {
-      bound_of_block(centre + x, circle, 2, bound);
-      if (exceeds(bound, limit)) strength_of_block(centre + x, circle, best);
-    }
+    Bytes best;
+    strength_of_block(rows, x, best);
+    found[x / kBlock] = exceeds(best, limits + x);
     std::memcpy(strength + x, &best, sizeof(best));
   }
 }
 
 FBVINS_KERNEL
 void keep_local_maxima(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int count,
-                       const std::uint8_t* limits, std::uint8_t* kept) {
-  for (int x = 0; x < count; ++x) {
-    const std::uint8_t s = here[x];
-    std::uint8_t before = std::max(above[x - 1], above[x]);
-    before = std::max(before, above[x + 1]);
-    before = std::max(before, here[x - 1]);
-    before = std::max(before, limits[x]);
-    std::uint8_t after = std::max(below[x - 1], below[x]);
-    after = std::max(after, below[x + 1]);
-    after = std::max(after, here[x + 1]);
-    const bool keep = (s > before) & (s >= after);
-    kept[x] = keep ? s : std::uint8_t{0};
+                       const std::uint8_t* limits, const std::uint8_t* found, std::uint8_t* kept) {
+  for (int block = 0; block < count; block += kBlock) {
+    if (!found[block / kBlock]) continue;
+    for (int x = block; x < block + kBlock; ++x) {
+      const std::uint8_t s = here[x];
+      std::uint8_t before = std::max(above[x - 1], above[x]);
+      before = std::max(before, above[x + 1]);
+      before = std::max(before, here[x - 1]);
+      before = std::max(before, limits[x]);
+      std::uint8_t after = std::max(below[x - 1], below[x]);
+      after = std::max(after, below[x + 1]);
+      after = std::max(after, here[x + 1]);
+      const bool keep = (s > before) & (s >= after);
+      kept[x] = keep ? s : std::uint8_t{0};
+    }
   }
 }
 
@@ -151,20 +162,25 @@ void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& 
   if (count <= 0 || level.height <= 2 * border) return;
   // Strengths one column and one row beyond the wanted area, for the neighbours' comparison.
   const int with_sides = count + 2;
-  const std::size_t pitch = static_cast<std::size_t>((with_sides + kBlock - 1) / kBlock * kBlock + kBlock);
-  buffers.rows.resize(4 * pitch);
-  std::uint8_t* ring[3] = {buffers.rows.data(), buffers.rows.data() + pitch, buffers.rows.data() + 2 * pitch};
-  std::uint8_t* kept = buffers.rows.data() + 3 * pitch;
-  std::memset(kept, 0, pitch);
+  const std::size_t blocks = static_cast<std::size_t>((with_sides + kBlock - 1) / kBlock), pitch = (blocks + 1) * kBlock;
+  buffers.rows.assign(4 * pitch + kBlock, 0);
+  const auto row = [&](int y) { return buffers.rows.data() + static_cast<std::size_t>(y % 3) * pitch + kBlock; };
+  std::uint8_t* kept = row(2) + pitch;
   buffers.limits.assign(pitch, static_cast<std::uint8_t>(floor));
+  buffers.found.assign(3 * blocks, 0);
 
-  const auto fill = [&](int y) { fast_strength_row(level.row(y) + border - 1, level.stride, with_sides, ring[y % 3]); };
+  const auto fill = [&](int y) {
+    fast_strength_row(level.row(y) + border - 1, level.stride, with_sides, buffers.limits.data(), row(y),
+                      buffers.found.data() + static_cast<std::size_t>(y % 3) * blocks);
+  };
   fill(border - 1);
   fill(border);
   for (int y = border; y < level.height - border; ++y) {
     fill(y + 1);
-    keep_local_maxima(ring[(y + 2) % 3] + 1, ring[y % 3] + 1, ring[(y + 1) % 3] + 1, count, buffers.limits.data(), kept);
-    collect_row(kept, count, border, y, out);
+    std::memset(kept, 0, pitch);
+    keep_local_maxima(row(y + 2), row(y), row(y + 1), with_sides, buffers.limits.data(),
+                      buffers.found.data() + static_cast<std::size_t>(y % 3) * blocks, kept);
+    collect_row(kept + 1, count, border, y, out);
   }
 }
 

@@ -22,27 +22,25 @@ struct FastCorner {
 
 /// Working memory of detect_fast, reused from call to call.
 struct FastBuffers {
-  std::vector<std::uint8_t> rows, limits;
+  std::vector<std::uint8_t> rows, limits, found;
 };
 
 /// Corners stronger than `floor` that are the strongest of their 3x3 neighbourhood, row by row, at least `border`
 /// (>= 4) px from the edges. The level must be readable 32 px beyond the end of each row (padding, next row).
 void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& buffers, std::vector<FastCorner>& out);
 
-/// strength[x] for `count` pixels of a row from `centre` on; writes up to the next multiple of 32.
-/// Strength: over all arcs of 9 of the 16 circle pixels, the largest smallest difference to the centre.
-void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t* strength);
-
 /// Pixels whose strengths are computed at a time.
 inline constexpr int kFastBlock = 32;
 
-/// The same, but a strength that does not exceed the limit of its block of kFastBlock pixels may be written as 0.
-void fast_strength_row_above(const std::uint8_t* centre, std::ptrdiff_t stride, int count, const std::uint8_t* limits,
-                             std::uint8_t* strength);
+/// strength[x] for `count` pixels of a row from `centre` on; writes up to the next multiple of kFastBlock.
+/// Strength: over all arcs of 9 of the 16 circle pixels, the largest smallest difference to the centre.
+/// `found` of each block of kFastBlock pixels: whether one exceeds its limit.
+void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, const std::uint8_t* limits,
+                       std::uint8_t* strength, std::uint8_t* found);
 
 /// Strengths of a row that beat their 3x3 neighbourhood and their column's limit, 0 elsewhere; of equal ones the first in reading
-/// order stays.
+/// order stays. Reads a pixel beyond both ends, and leaves alone the blocks that are not `found`.
 void keep_local_maxima(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int count,
-                       const std::uint8_t* limits, std::uint8_t* kept);
+                       const std::uint8_t* limits, const std::uint8_t* found, std::uint8_t* kept);
 
 }  // namespace fbvins

@@ -25,60 +25,43 @@ void FastCells::detect(const PyramidLevel& level, int border, int floor, std::ve
   // Strengths one column and one row beyond the wanted area, for the neighbours' comparison.
   const std::size_t blocks = static_cast<std::size_t>(count_ + 2 + kFastBlock - 1) / kFastBlock;
   pitch_ = (blocks + 1) * kFastBlock;
-  rows_.assign(4 * pitch_, 0);
-  skip_.assign(blocks, floor_);
-  limits_.assign(static_cast<std::size_t>(columns_ * kSide), floor_);
-  cell_limits_.assign(static_cast<std::size_t>(columns_) + 2, floor_);
+  rows_.assign(4 * pitch_ + kFastBlock, 0);
+  found_.assign(3 * blocks, 0);
+  limits_.assign(static_cast<std::size_t>(columns_ * kSide) + 2 * kFastBlock, floor_);
   cells_.assign(static_cast<std::size_t>(columns_ * ((level.height + kSide - 1) / kSide)), Cell{});
 
   fill(border - 1);
   fill(border);
   for (int y = border; y < level.height - border; ++y) {
-    if (y % kSide == 0) {
-      std::fill(limits_.begin(), limits_.end(), floor_);
-      std::fill(cell_limits_.begin(), cell_limits_.end(), floor_);
-    }
+    if (y % kSide == 0) std::fill(limits_.begin(), limits_.end(), floor_);  // the row above has set some again
     fill(y + 1);
     collect(y);
   }
   for (const Cell& cell : cells_) out.insert(out.end(), cell.strongest, cell.strongest + cell.count);
 }
 
-/// Strengths of row y, skipping blocks in which no pixel can exceed the limits of the cells that it belongs to or is compared in.
-/// The last row of a cell and the first row of the next are compared with one another, before the lower cell has a limit: there
-/// the floor counts.
+/// Strengths of row y. With its first row, which is filled before the row above is collected, a row of cells has no limits yet.
 void FastCells::fill(int y) {
-  const bool last = y % kSide == kSide - 1 || y % kSide == 0;
-  // a block and the pixels beside it touch these cells
-  const std::uint8_t* cell = cell_limits_.data() + (border_ - 2) / kSide;
-  const int more = (border_ - 1 + kFastBlock) / kSide - (border_ - 2) / kSide;
-  for (std::size_t b = 0; b < skip_.size(); ++b)
-    skip_[b] = last ? floor_ : std::min({cell[b], cell[b + 1], cell[b + static_cast<std::size_t>(more)]});
-  fast_strength_row_above(level_.row(y) + border_ - 1, level_.stride, count_ + 2, skip_.data(),
-                          rows_.data() + static_cast<std::size_t>(y % 3) * pitch_);
+  if (y % kSide == 0) std::fill(limits_.begin(), limits_.end(), floor_);
+  fast_strength_row(level_.row(y) + border_ - 1, level_.stride, count_ + 2, limits_.data() + border_ - 1, row(y), found(y));
 }
 
 /// Few pixels remain: eight at a time are tested as one integer.
 void FastCells::collect(int y) {
   static_assert(std::endian::native == std::endian::little, "the lowest byte must be the first pixel");
-  const auto row = [&](int r) { return rows_.data() + static_cast<std::size_t>(r % 3) * pitch_ + 1; };
-  std::uint8_t* left = rows_.data() + 3 * pitch_;
-  keep_local_maxima(row(y + 2), row(y), row(y + 1), count_, limits_.data() + border_, left);
-  for (int block = 0; block < count_; block += 8) {
-    std::uint64_t eight;
-    if (block % 32 == 0) {  // most blocks are empty
-      std::uint64_t words[4];
-      std::memcpy(words, left + block, sizeof(words));
-      if ((words[0] | words[1] | words[2] | words[3]) == 0) {
-        block += 24;
-        continue;
+  std::uint8_t* left = row(2) + pitch_;
+  const std::uint8_t* found_here = found(y);
+  keep_local_maxima(row(y + 2), row(y), row(y + 1), count_ + 2, limits_.data() + border_ - 1, found_here, left);
+  for (int block = 0; block < count_ + 2; block += kFastBlock) {
+    if (!found_here[block / kFastBlock]) continue;
+    for (int first = block; first < block + kFastBlock; first += 8) {
+      std::uint64_t eight;
+      std::memcpy(&eight, left + first, sizeof(eight));
+      while (eight != 0) {
+        const int k = std::countr_zero(eight) / 8, x = border_ - 1 + first + k;
+        if (x >= border_ && x < border_ + count_) keep(x, y, static_cast<std::uint8_t>(eight >> (8 * k)));
+        eight &= ~(std::uint64_t{0xff} << (8 * k));
       }
-    }
-    std::memcpy(&eight, left + block, sizeof(eight));
-    while (eight != 0) {
-      const int k = std::countr_zero(eight) / 8;
-      keep(border_ + block + k, y, static_cast<std::uint8_t>(eight >> (8 * k)));
-      eight &= ~(std::uint64_t{0xff} << (8 * k));
     }
   }
 }
@@ -96,7 +79,6 @@ void FastCells::keep(int x, int y, std::uint8_t strength) {
   first[place] = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), strength};
   cell.count = std::min(cell.count + 1, kFastPerCell);
   if (cell.count < kFastPerCell) return;
-  cell_limits_[static_cast<std::size_t>(column)] = first[kFastPerCell - 1].strength;
   std::memset(&limits_[static_cast<std::size_t>(column * kSide)], first[kFastPerCell - 1].strength, kSide);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The strongest FAST corners of each cell of a level: those that detect_fast() finds, without computing the strength where a
-// cell already has its share of stronger ones. One instance, one thread; buffers are reused.
+// The strongest FAST corners of each cell of a level: those that detect_fast() finds, looked for only where they exceed
+// what their cell already has. One instance, one thread; buffers are reused.
 //
 //   FastCells cells;
 //   cells.detect(level, 12, 6, corners);
@@ -42,6 +42,8 @@ class FastCells {
   void fill(int y);
   void collect(int y);
   void keep(int x, int y, std::uint8_t strength);
+  std::uint8_t* row(int y) { return rows_.data() + static_cast<std::size_t>(y % 3) * pitch_ + kFastBlock; }
+  std::uint8_t* found(int y) { return found_.data() + static_cast<std::size_t>(y % 3) * (found_.size() / 3); }
 
   // of the level in work
   PyramidLevel level_{};
@@ -49,10 +51,9 @@ class FastCells {
   int border_ = 0, count_ = 0, columns_ = 0;
   std::uint8_t floor_ = 0;
   std::size_t pitch_ = 0;
-  std::vector<std::uint8_t> rows_;         // three rows of strengths, one of local maxima
-  std::vector<std::uint8_t> limits_;       // of each column: its cell takes only corners stronger than this
-  std::vector<std::uint8_t> cell_limits_;  // of each cell in the row of cells at work
-  std::vector<std::uint8_t> skip_;         // of each block of a row: strengths up to this need not be computed
+  std::vector<std::uint8_t> rows_;    // three rows of strengths, one of local maxima, from one column left of the border on
+  std::vector<std::uint8_t> found_;   // of each block of three rows: whether a strength exceeds its limit
+  std::vector<std::uint8_t> limits_;  // of each column: its cell takes only corners stronger than this
   std::vector<Cell> cells_;
 };
 

@@ -50,10 +50,13 @@ TEST(Fast, StrengthIsTheLargestThresholdOfTheDefinition) {
     const Image image = random_image(5, 83, 41, range);
     ScalePyramid pyramid;  // gives the padding
     pyramid.build(image.view(), 1, 1.2);
-    std::vector<std::uint8_t> strength(128);
+    std::vector<std::uint8_t> strength(128), limits(128, 6), found(4);
     for (int y = 3; y < 38; ++y) {
-      fast_strength_row(pyramid.level(0).row(y) + 3, pyramid.level(0).stride, 77, strength.data());
+      fast_strength_row(pyramid.level(0).row(y) + 3, pyramid.level(0).stride, 77, limits.data(), strength.data(), found.data());
       for (int x = 3; x < 80; ++x) ASSERT_EQ(strength[x - 3], naive_strength(image, x, y)) << x << ' ' << y;
+      for (int block = 0; block < 96; block += kFastBlock)
+        ASSERT_EQ(found[block / kFastBlock],
+                  std::any_of(&strength[block], &strength[block] + kFastBlock, [](std::uint8_t s) { return s > 6; }));
     }
   }
 }

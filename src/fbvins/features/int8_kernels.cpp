@@ -42,8 +42,9 @@ std::int32_t four_bytes(const std::int8_t* p) {
   return v;
 }
 
-/// |a| times (w with a's sign): vpmaddubsw takes an unsigned and a signed factor, and 2 * 127 * 127 fits its 16 bits.
-template <int Blocks>
+/// |a| times (w with a's sign): vpmaddubsw takes an unsigned and a signed factor, and 2 * 127 * 127 fits its 16 bits. Without
+/// `Signs` no value is negative.
+template <int Blocks, bool Signs>
 __attribute__((target("avx2"))) void sums_avx2_of(const std::int8_t* values, const std::int8_t* weights, int inputs,
                                                   std::int32_t* sums) {
   const __m256i ones = _mm256_set1_epi16(1);
@@ -55,13 +56,13 @@ __attribute__((target("avx2"))) void sums_avx2_of(const std::int8_t* values, con
       __m256i a[2], magnitude[2];
       for (int r = 0; r < 2; ++r) {
         a[r] = _mm256_set1_epi32(four_bytes(values + (first + r) * inputs + 4 * g));
-        magnitude[r] = _mm256_abs_epi8(a[r]);
+        magnitude[r] = Signs ? _mm256_abs_epi8(a[r]) : a[r];
       }
       for (int b = 0; b < Blocks; ++b)
         for (int half = 0; half < 2; ++half) {
           const __m256i w = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(weights + b * 16 * inputs + 64 * g + 32 * half));
           for (int r = 0; r < 2; ++r) {
-            const __m256i pairs = _mm256_maddubs_epi16(magnitude[r], _mm256_sign_epi8(w, a[r]));
+            const __m256i pairs = _mm256_maddubs_epi16(magnitude[r], Signs ? _mm256_sign_epi8(w, a[r]) : w);
             sum[r][2 * b + half] = _mm256_add_epi32(sum[r][2 * b + half], _mm256_madd_epi16(pairs, ones));
           }
         }
@@ -72,13 +73,33 @@ __attribute__((target("avx2"))) void sums_avx2_of(const std::int8_t* values, con
   }
 }
 
-__attribute__((target("avx2"))) void sums_avx2(const std::int8_t* values, const std::int8_t* weights, const std::int32_t*,
-                                               int inputs, int blocks, std::int32_t* sums) {
+/// Behind a rectifier none is.
+__attribute__((target("avx2"))) bool any_negative(const std::int8_t* values, int count) {
+  __m256i all = _mm256_setzero_si256();
+  int i = 0;
+  for (; i + 32 <= count; i += 32) all = _mm256_or_si256(all, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values + i)));
+  bool negative = _mm256_movemask_epi8(all) != 0;
+  for (; i < count; ++i) negative = negative || values[i] < 0;
+  return negative;
+}
+
+template <bool Signs>
+__attribute__((target("avx2"))) void sums_avx2_in_twos(const std::int8_t* values, const std::int8_t* weights, int inputs,
+                                                       int blocks, std::int32_t* sums) {
   for (int b = 0; b < blocks; b += 2) {
     const std::int8_t* w = weights + b * 16 * inputs;
-    if (b + 2 <= blocks) sums_avx2_of<2>(values, w, inputs, sums + 16 * b);
-    else sums_avx2_of<1>(values, w, inputs, sums + 16 * b);
+    if (b + 2 <= blocks) sums_avx2_of<2, Signs>(values, w, inputs, sums + 16 * b);
+    else sums_avx2_of<1, Signs>(values, w, inputs, sums + 16 * b);
   }
+}
+
+__attribute__((target("avx2"))) void sums_avx2(const std::int8_t* values, const std::int8_t* weights, const std::int32_t*,
+                                               int inputs, int blocks, std::int32_t* sums) {
+  // Early values of either sign, as most rows have, answer for the rest.
+  const int few = inputs < 32 ? inputs : 32;
+  if (any_negative(values, few) || any_negative(values, kRows * inputs))
+    sums_avx2_in_twos<true>(values, weights, inputs, blocks, sums);
+  else sums_avx2_in_twos<false>(values, weights, inputs, blocks, sums);
 }
 
 #define FBVINS_VNNI __attribute__((target("avx512f,avx512bw,avx512vnni")))

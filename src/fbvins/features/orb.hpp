@@ -57,7 +57,8 @@ class OrbExtractor {
   FastCells fast_;
   std::vector<FastCorner> corners_;
   std::vector<Candidate> candidates_, chosen_;
-  std::vector<std::uint8_t> smooth_half_, scratch_;
+  std::vector<std::uint8_t> smooth_half_;
+  std::vector<std::uint16_t> scratch_;
 };
 
 /// Harris response det(M) - 0.04 trace(M)^2 (eq. 2-3) over 8x8 gradients around (x, y); needs 5 px around.

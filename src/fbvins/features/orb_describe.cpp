@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Harris score, orientation and bits of one keypoint.
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 #include "fbvins/core/simd.hpp"
@@ -44,37 +45,29 @@ void disc_moments(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_
   *m01 = sum_y;
 }
 
-using I16x8 = std::int16_t __attribute__((vector_size(16)));
-using I32x8 = std::int32_t __attribute__((vector_size(32)));
-
-FBVINS_INLINE void load_eight(const std::uint8_t* p, I16x8& out) {
-  using U8x8 = std::uint8_t __attribute__((vector_size(8)));
-  U8x8 bytes;
-  std::memcpy(&bytes, p, sizeof(bytes));
-  out = __builtin_convertvector(bytes, I16x8);
-}
-
-/// Sums of squared Sobel gradients over 8x8 pixels from `corner` on, a column a lane. A gradient is at most 4 * 255.
+/// Sums of squared Sobel gradients over 8x8 pixels from `corner` on. A gradient is at most 4 * 255.
 FBVINS_KERNEL
-void gradient_sums(const std::uint8_t* corner, std::ptrdiff_t s, std::int32_t* xx, std::int32_t* xy, std::int32_t* yy) {
-  I16x8 smooth[3] = {}, slope[3] = {};  // of the last three rows: 1 2 1 and -1 0 1
-  I32x8 a{}, b{}, c{};
-  for (int r = -1; r <= 8; ++r) {
-    const std::uint8_t* p = corner + r * s;
-    I16x8 left, mid, right;
-    load_eight(p - 1, left);
-    load_eight(p, mid);
-    load_eight(p + 1, right);
-    smooth[0] = smooth[1], smooth[1] = smooth[2], smooth[2] = left + 2 * mid + right;
-    slope[0] = slope[1], slope[1] = slope[2], slope[2] = right - left;
-    if (r < 1) continue;
-    const I32x8 gx = __builtin_convertvector(slope[0] + 2 * slope[1] + slope[2], I32x8);
-    const I32x8 gy = __builtin_convertvector(smooth[2] - smooth[0], I32x8);
-    a += gx * gx;
-    b += gx * gy;
-    c += gy * gy;
+void gradient_sums(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_t* xx, std::int32_t* xy, std::int32_t* yy) {
+  constexpr int kSide = 8;
+  std::int16_t smooth[(kSide + 2) * kSide], slope[(kSide + 2) * kSide];  // along each row: 1 2 1 and -1 0 1
+  for (int r = 0; r < kSide + 2; ++r) {
+    const std::uint8_t* p = corner + (r - 1) * stride;
+    for (int c = 0; c < kSide; ++c) {
+      const std::int16_t left = p[c - 1], mid = p[c], right = p[c + 1];
+      smooth[r * kSide + c] = static_cast<std::int16_t>(left + 2 * mid + right);
+      slope[r * kSide + c] = static_cast<std::int16_t>(right - left);
+    }
   }
-  for (int i = 0; i < 8; ++i) *xx += a[i], *xy += b[i], *yy += c[i];
+  std::int16_t gx[kSide * kSide], gy[kSide * kSide];
+  for (int i = 0; i < kSide * kSide; ++i) {
+    gx[i] = static_cast<std::int16_t>(slope[i] + 2 * slope[i + kSide] + slope[i + 2 * kSide]);
+    gy[i] = static_cast<std::int16_t>(smooth[i + 2 * kSide] - smooth[i]);
+  }
+  std::int32_t a = 0, b = 0, c = 0;
+  for (int i = 0; i < kSide * kSide; ++i) a += gx[i] * gx[i];
+  for (int i = 0; i < kSide * kSide; ++i) b += gx[i] * gy[i];
+  for (int i = 0; i < kSide * kSide; ++i) c += gy[i] * gy[i];
+  *xx = a, *xy = b, *yy = c;
 }
 
 FBVINS_KERNEL
@@ -94,34 +87,40 @@ struct PatternLanes {
   }
 };
 
-/// Offsets of both points of the pairs after turning and moving by (x, y), rounded to whole pixels.
+/// Places of both points of the pairs after turning and moving by (x, y), rounded to whole pixels, counted from the pixel
+/// kPatternRadius left of and above the centre.
 FBVINS_KERNEL
-void turn_pattern(const PatternLanes& lanes, float c, float s, float x, float y, std::int32_t stride, std::int32_t* a,
-                  std::int32_t* b) {
-  constexpr float kBias = 64.5f;  // truncation of positive numbers rounds without a library call
+void turn_pattern(const PatternLanes& lanes, float c, float s, float x, float y, std::int32_t stride, std::uint32_t* a,
+                  std::uint32_t* b) {
+  constexpr int kWhole = 64;
+  constexpr float kBias = kWhole + 0.5f;  // truncation of positive numbers rounds without a library call
   const float x0 = x + kBias, y0 = y + kBias;
+  const std::int32_t first = (kWhole - kPatternRadius) * (stride + 1);
   for (int i = 0; i < 256; ++i) {
-    const auto xa = static_cast<std::int32_t>(c * lanes.ax[i] - s * lanes.ay[i] + x0) - 64;
-    const auto ya = static_cast<std::int32_t>(s * lanes.ax[i] + c * lanes.ay[i] + y0) - 64;
-    const auto xb = static_cast<std::int32_t>(c * lanes.bx[i] - s * lanes.by[i] + x0) - 64;
-    const auto yb = static_cast<std::int32_t>(s * lanes.bx[i] + c * lanes.by[i] + y0) - 64;
-    a[i] = ya * stride + xa;
-    b[i] = yb * stride + xb;
+    const auto xa = static_cast<std::int32_t>(c * lanes.ax[i] - s * lanes.ay[i] + x0);
+    const auto ya = static_cast<std::int32_t>(s * lanes.ax[i] + c * lanes.ay[i] + y0);
+    const auto xb = static_cast<std::int32_t>(c * lanes.bx[i] - s * lanes.by[i] + x0);
+    const auto yb = static_cast<std::int32_t>(s * lanes.bx[i] + c * lanes.by[i] + y0);
+    a[i] = static_cast<std::uint32_t>(ya * stride + xa - first);
+    b[i] = static_cast<std::uint32_t>(yb * stride + xb - first);
   }
 }
 
-/// Differences to margins; one that is not zero keeps its sign.
+/// Differences to margins; one that is not zero keeps its sign. In steps that each keep to one width of numbers.
 FBVINS_KERNEL
 void scale_differences(const std::int16_t* difference, std::int8_t* margin) {
   std::int32_t squares = 0;
   for (int i = 0; i < 256; ++i) squares += difference[i] * difference[i];
   const float factor = squares > 0 ? 1 / (kMarginUnit * std::sqrt(static_cast<float>(squares) / 256)) : 0.0f;
+  std::int16_t size[256], scaled[256];  // at most 255, and 512: where all but one difference are zero
+  for (int i = 0; i < 256; ++i) size[i] = static_cast<std::int16_t>(std::abs(difference[i]));
+  for (int i = 0; i < 256; ++i)
+    scaled[i] = static_cast<std::int16_t>(static_cast<std::int32_t>(static_cast<float>(size[i]) * factor + 0.5f));
   for (int i = 0; i < 256; ++i) {
-    const std::int32_t d = difference[i], size = d < 0 ? -d : d;
-    std::int32_t m = static_cast<std::int32_t>(static_cast<float>(size) * factor + 0.5f);
-    m = m > 127 ? 127 : m;
-    m = m < 1 && size > 0 ? 1 : m;
-    margin[i] = static_cast<std::int8_t>(d < 0 ? -m : m);
+    const std::int16_t least = size[i] < 1 ? size[i] : std::int16_t{1};
+    std::int16_t m = scaled[i] > 127 ? std::int16_t{127} : scaled[i];
+    m = m < least ? least : m;
+    margin[i] = static_cast<std::int8_t>(difference[i] < 0 ? static_cast<std::int16_t>(-m) : m);
   }
 }
 
@@ -144,13 +143,14 @@ Vec2 centroid_direction(const PyramidLevel& level, int x, int y) {
 
 Comparisons compare(const PyramidLevel& smooth, const Vec2& pixel, const Vec2& direction) {
   static const PatternLanes lanes;
-  std::int32_t a[256], b[256];
+  std::uint32_t a[256], b[256];
   const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
   turn_pattern(lanes, static_cast<float>(direction.x()), static_cast<float>(direction.y()), static_cast<float>(pixel.x() - x),
                static_cast<float>(pixel.y() - y), static_cast<std::int32_t>(smooth.stride), a, b);
-  const std::uint8_t* centre = smooth.row(y) + x;
+  const std::uint8_t* first = smooth.row(y - kPatternRadius) + x - kPatternRadius;
   Comparisons difference;
-  for (std::size_t i = 0; i < 256; ++i) difference[i] = static_cast<std::int16_t>(centre[b[i]] - centre[a[i]]);
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < 256; ++i) difference[i] = static_cast<std::int16_t>(first[b[i]] - first[a[i]]);
   return difference;
 }
 

@@ -202,7 +202,7 @@ TEST(Orb, SurroundingsReachTwiceAsFarAndFeelHalfTheNoise) {
   const auto smooth = [](const Image& image, std::vector<std::uint8_t>& out, bool half) {
     Pyramid pyramid;
     pyramid.build(image.view(), 2);
-    std::vector<std::uint8_t> scratch;
+    std::vector<std::uint16_t> scratch;
     return smooth_level(pyramid.level(half ? 1 : 0), out, scratch);
   };
   const auto margins = [&](const Image& image) {

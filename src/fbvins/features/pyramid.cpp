@@ -73,7 +73,8 @@ void Pyramid::build(const ImageView& image, int levels) {
     width = (width + 1) / 2;
     height = (height + 1) / 2;
   }
-  pixels_.resize(total + 64);  // kernels may read a few bytes past the last row
+  // Kernels may read a few bytes past the last row. A buffer that shrank would be filled with zeros when it grows again.
+  if (pixels_.size() < total + 64) pixels_.resize(total + 64);
   column_sums_.resize(static_cast<std::size_t>(image.width) + 2 * kBorder);
 
   std::uint8_t* place = pixels_.data();

@@ -30,21 +30,27 @@ FBVINS_INLINE void pick(const U8x16& from, const U8x16& which, U8x16& out) {
 #endif
 }
 
-/// Sixteen source pixels give one block of results by picking left and right neighbours and blending: a byte shuffle
-/// instead of a collect. The lanes beyond the block are overwritten by the next one.
+/// Left and right neighbours of the pixels of a smaller row: sixteen source pixels give one block by a byte shuffle instead of a
+/// collect. The lanes beyond the block are overwritten by the next one.
 FBVINS_KERNEL
-void blend_columns(const std::uint8_t* row, const ShrinkBlock* blocks, int count, int block_px, std::uint8_t* out) {
-  using U16x16 = std::uint16_t __attribute__((vector_size(32)));
-  for (int i = 0; i < count; ++i) {
-    U8x16 source, left, right;
+void pick_neighbours(const std::uint8_t* row, const ShrinkBlock* blocks, int count, int block_px, std::uint8_t* left,
+                     std::uint8_t* right) {
+  for (int i = 0; i < count; ++i, left += block_px, right += block_px) {
+    U8x16 source, picked;
     std::memcpy(&source, row + blocks[i].first, sizeof(source));
-    pick(source, blocks[i].left, left);
-    pick(source, blocks[i].right, right);
-    const U16x16 w = __builtin_convertvector(blocks[i].weight, U16x16);
-    const U16x16 sum = (__builtin_convertvector(left, U16x16) * (128 - w) + __builtin_convertvector(right, U16x16) * w + 64) >> 7;
-    const U8x16 bytes = __builtin_convertvector(sum, U8x16);
-    std::memcpy(out + i * block_px, &bytes, sizeof(bytes));
+    pick(source, blocks[i].left, picked);
+    std::memcpy(left, &picked, sizeof(picked));
+    pick(source, blocks[i].right, picked);
+    std::memcpy(right, &picked, sizeof(picked));
   }
+}
+
+/// Weights out of 128: `weight` is right's.
+FBVINS_KERNEL
+void blend_neighbours(const std::uint8_t* left, const std::uint8_t* right, const std::uint8_t* weight, int count,
+                      std::uint8_t* out) {
+  for (int x = 0; x < count; ++x)
+    out[x] = static_cast<std::uint8_t>(static_cast<std::uint16_t>(left[x] * (128 - weight[x]) + right[x] * weight[x] + 64) >> 7);
 }
 
 void replicate_borders(std::uint8_t* origin, int width, int height, std::ptrdiff_t stride) {
@@ -60,27 +66,49 @@ void replicate_borders(std::uint8_t* origin, int width, int height, std::ptrdiff
   }
 }
 
-/// `count` pixels from p on, each blended with its neighbours up to three steps away: weights 4 9 12 14 12 9 4 out of 64,
-/// standard deviation 1.6 px. All sums fit into 16 bits.
-FBVINS_INLINE void blend_seven(const std::uint8_t* __restrict p, std::ptrdiff_t step, int count, std::uint8_t* __restrict out) {
-  for (int x = 0; x < count; ++x) {
-    const std::uint16_t outer = static_cast<std::uint16_t>(p[x - 3 * step] + p[x + 3 * step]);
-    const std::uint16_t middle = static_cast<std::uint16_t>(p[x - 2 * step] + p[x + 2 * step]);
-    const std::uint16_t inner = static_cast<std::uint16_t>(p[x - step] + p[x + step]);
-    const std::uint16_t sum = static_cast<std::uint16_t>(4 * outer + 9 * middle + 12 * inner + 14 * p[x] + 32);
-    out[x] = static_cast<std::uint8_t>(sum >> 6);
-  }
+/// Seven neighbouring pixels: weights 4 9 12 14 12 9 4 out of 64, standard deviation 1.6 px. All sums fit into 16 bits.
+FBVINS_INLINE std::uint16_t blend_seven(std::uint16_t p0, std::uint16_t p1, std::uint16_t p2, std::uint16_t p3, std::uint16_t p4,
+                                        std::uint16_t p5, std::uint16_t p6) {
+  const std::uint16_t outer = static_cast<std::uint16_t>(p0 + p6), middle = static_cast<std::uint16_t>(p1 + p5),
+                      inner = static_cast<std::uint16_t>(p2 + p4);
+  return static_cast<std::uint16_t>(static_cast<std::uint16_t>(4 * outer + 9 * middle + 12 * inner + 14 * p3 + 32) >> 6);
+}
+
+/// To sixteen bits, once for all sums that a pixel is part of.
+FBVINS_INLINE void widen(const std::uint8_t* p, int count, std::uint16_t* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] = p[x];
+}
+
+/// Across seven rows, which are `step` apart.
+FBVINS_INLINE void blend_rows_of_seven(const std::uint16_t* p, std::ptrdiff_t step, int count, std::uint16_t* __restrict out) {
+  for (int x = 0; x < count; ++x)
+    out[x] = blend_seven(p[x], p[x + step], p[x + 2 * step], p[x + 3 * step], p[x + 4 * step], p[x + 5 * step], p[x + 6 * step]);
+}
+
+/// Along a row, from three pixels right of p on.
+FBVINS_INLINE void blend_along(const std::uint16_t* p, int count, std::uint8_t* __restrict out) {
+  for (int x = 0; x < count; ++x)
+    out[x] = static_cast<std::uint8_t>(blend_seven(p[x], p[x + 1], p[x + 2], p[x + 3], p[x + 4], p[x + 5], p[x + 6]));
 }
 
 FBVINS_KERNEL
-void smooth_pixels(const std::uint8_t* p, std::ptrdiff_t step, int count, std::uint8_t* out) { blend_seven(p, step, count, out); }
+void widen_row(const std::uint8_t* p, int count, std::uint16_t* out) { widen(p, count, out); }
+
+FBVINS_KERNEL
+void smooth_wide_rows(const std::uint16_t* rows, std::ptrdiff_t step, int count, std::uint16_t* columns, std::uint8_t* out) {
+  blend_rows_of_seven(rows, step, count + 6, columns);
+  blend_along(columns, count, out);
+}
 
 FBVINS_KERNEL
 void smooth_rows_of_patch(const std::uint8_t* centre, std::ptrdiff_t stride, std::uint8_t* out) {
-  std::uint8_t columns[3 * kLanes];  // from three pixels left of the patch on
-  for (int y = -kSmoothPatchRadius; y <= kSmoothPatchRadius; ++y, out += SmoothPatch::kStride) {
-    blend_seven(centre + y * stride - kSmoothPatchRadius - 3, stride, 3 * kLanes, columns);
-    blend_seven(columns + 3, 1, 2 * kLanes, out);
+  constexpr int kSide = SmoothPatch::kSide + 6, kWidth = 5 * kLanes / 2;
+  std::uint16_t wide[kSide * kWidth], columns[3 * kLanes] = {};
+  const std::uint8_t* corner = centre - (kSide / 2) * (stride + 1);
+  for (int y = 0; y < kSide; ++y) widen(corner + y * stride, kWidth, wide + y * kWidth);
+  for (int y = 0; y < SmoothPatch::kSide; ++y, out += SmoothPatch::kStride) {
+    blend_rows_of_seven(wide + y * kWidth, kWidth, kWidth, columns);
+    blend_along(columns, SmoothPatch::kStride, out);
   }
 }
 
@@ -89,7 +117,9 @@ void smooth_rows_of_patch(const std::uint8_t* centre, std::ptrdiff_t stride, std
 void ScalePyramid::shrink(const PyramidLevel& from, double ratio, const PyramidLevel& to, std::uint8_t* origin) {
   const int block_px = std::min(kLanes, static_cast<int>((kLanes - 3) / ratio) + 1);
   const int count = (to.width + block_px - 1) / block_px;
+  const std::size_t picked = static_cast<std::size_t>(count * block_px + kLanes);
   blocks_.assign(static_cast<std::size_t>(count), ShrinkBlock{});
+  weights_.resize(picked);
   for (int i = 0; i < count; ++i) {
     ShrinkBlock& block = blocks_[static_cast<std::size_t>(i)];
     for (int k = 0; k < block_px; ++k) {
@@ -98,16 +128,19 @@ void ScalePyramid::shrink(const PyramidLevel& from, double ratio, const PyramidL
       if (k == 0) block.first = column;
       block.left[k] = static_cast<std::uint8_t>(column - block.first);
       block.right[k] = static_cast<std::uint8_t>(column - block.first + 1);
-      block.weight[k] = static_cast<std::uint8_t>((at - column) * 128.0 + 0.5);
+      weights_[static_cast<std::size_t>(i * block_px + k)] = static_cast<std::uint8_t>((at - column) * 128.0 + 0.5);
     }
   }
-  row_.resize(static_cast<std::size_t>(from.width) + 2 * kLanes);
+  row_.resize(static_cast<std::size_t>(from.width) + 2 * kLanes + 2 * picked);
+  std::uint8_t* left = row_.data() + from.width + 2 * kLanes;
+  std::uint8_t* right = left + picked;
   for (int y = 0; y < to.height; ++y) {
     const double at = std::clamp((y + 0.5) * ratio - 0.5, 0.0, from.height - 1.0);
     const int row = static_cast<int>(at);
     const int w1 = static_cast<int>((at - row) * 128.0 + 0.5);
     blend_rows(from.row(row), from.row(row + 1), w1, from.width + 1, row_.data());
-    blend_columns(row_.data(), blocks_.data(), count, block_px, origin + y * to.stride);
+    pick_neighbours(row_.data(), blocks_.data(), count, block_px, left, right);
+    blend_neighbours(left, right, weights_.data(), to.width, origin + y * to.stride);
   }
 }
 
@@ -140,16 +173,24 @@ void ScalePyramid::build(const ImageView& image, int levels, double factor) {
   }
 }
 
-PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& out, std::vector<std::uint8_t>& scratch) {
-  const int margin = kSmoothMargin, side = margin + 3;
+PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& out, std::vector<std::uint16_t>& scratch) {
+  const int margin = kSmoothMargin, side = margin + 3, wide = level.width + 2 * side;
   const std::size_t rows = static_cast<std::size_t>(level.height + 2 * margin);
   const std::size_t pitch = static_cast<std::size_t>(level.stride);
   if (out.size() < rows * pitch + 64) out.resize(rows * pitch + 64);
-  if (scratch.size() < pitch + 64) scratch.resize(pitch + 64);
+  // The last seven rows lie one after the other: each is written twice, seven places apart.
+  if (scratch.size() < 15 * pitch + 64) scratch.resize(15 * pitch + 64);
+  const auto place = [&](int y) { return scratch.data() + static_cast<std::size_t>((y + side) % 7) * pitch; };
+  const auto take = [&](int y) {
+    widen_row(level.row(y) - side, wide, place(y));
+    std::memcpy(place(y) + 7 * pitch, place(y), static_cast<std::size_t>(wide) * sizeof(std::uint16_t));
+  };
+  for (int y = -side; y < 3 - margin; ++y) take(y);
   std::uint8_t* origin = out.data() + static_cast<std::size_t>(margin) * pitch + margin;
   for (int y = -margin; y < level.height + margin; ++y) {
-    smooth_pixels(level.row(y) - side, level.stride, level.width + 2 * side, scratch.data());
-    smooth_pixels(scratch.data() + 3, 1, level.width + 2 * margin, origin + y * level.stride - margin);
+    take(y + 3);
+    smooth_wide_rows(place(y - 3), level.stride, level.width + 2 * margin, scratch.data() + 14 * pitch,
+                     origin + y * level.stride - margin);
   }
   return {origin, level.width, level.height, level.stride};
 }

@@ -15,10 +15,10 @@
 
 namespace fbvins {
 
-/// How sixteen pixels of a row become the next few of a smaller one.
+/// From which of sixteen pixels of a row the next few of a smaller one are blended.
 struct ShrinkBlock {
-  U8x16 left{}, right{}, weight{};  // right's weight out of 128
-  int first = 0;                    // column of lane 0
+  U8x16 left{}, right{};
+  int first = 0;  // column of lane 0
 };
 
 class ScalePyramid {
@@ -40,13 +40,14 @@ class ScalePyramid {
   std::vector<std::uint8_t> pixels_;
   std::vector<PyramidLevel> levels_;
   std::vector<double> scales_;
-  std::vector<std::uint8_t> row_;    // after the vertical filter
-  std::vector<ShrinkBlock> blocks_;  // of one row
+  std::vector<std::uint8_t> row_;      // after the vertical filter, then its left and right neighbours of each pixel
+  std::vector<std::uint8_t> weights_;  // of the right neighbours, out of 128
+  std::vector<ShrinkBlock> blocks_;    // of one row
 };
 
 /// Smooths a level for BRIEF (7x7, about 1.6 px standard deviation), valid up to 8 px beyond the edges.
 /// `out` and `scratch` are resized as needed; the returned view points into `out`.
-PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& out, std::vector<std::uint8_t>& scratch);
+PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& out, std::vector<std::uint16_t>& scratch);
 
 /// Around one pixel of a level, so much of what smooth_level() gives.
 inline constexpr int kSmoothPatchRadius = 13;

@@ -46,7 +46,8 @@ TEST(SmoothLevel, KeepsConstantsAndTheSumOfAPoint) {
   image.at(50, 40) = 228;
   ScalePyramid pyramid;
   pyramid.build(image.view(), 1, 1.2);
-  std::vector<std::uint8_t> out, scratch;
+  std::vector<std::uint8_t> out;
+  std::vector<std::uint16_t> scratch;
   const PyramidLevel smooth = smooth_level(pyramid.level(0), out, scratch);
   EXPECT_EQ(smooth.row(-8)[-8], 100);
   EXPECT_EQ(smooth.row(87)[107], 100);
@@ -64,7 +65,8 @@ TEST(SmoothPatch, HasThePixelsOfTheSmoothedLevel) {
     for (int x = 0; x < image.width(); ++x) image.at(x, y) = static_cast<std::uint8_t>((x * x + 3 * x * y + 7 * y) % 251);
   ScalePyramid pyramid;
   pyramid.build(image.view(), 1, 1.2);
-  std::vector<std::uint8_t> out, scratch;
+  std::vector<std::uint8_t> out;
+  std::vector<std::uint16_t> scratch;
   const PyramidLevel whole = smooth_level(pyramid.level(0), out, scratch);
   SmoothPatch pixels;
   for (const auto& [x, y] : {std::pair{12, 12}, {77, 67}, {40, 30}}) {  // at the edges, too
