@@ -49,7 +49,7 @@ inline constexpr KltFollowEffort kFollowedByPair{0, 0, false, 0.1};
 
 class KltFollower {
  public:
-  KltFollower(const Camera& camera, const KltFollowEffort& effort) : camera_(camera), effort_(effort) {}
+  explicit KltFollower(const Camera& camera, const KltFollowEffort& effort = {}) : camera_(camera), effort_(effort) {}
 
   /// False when it is lost.
   bool follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,

@@ -13,7 +13,7 @@ namespace klt_follower_test {
 struct Scene {
   TestWall wall;
   FrameImages images{wall.rig(), kKltLevels};
-  KltFollower follower{wall.camera, KltFollowEffort{}};
+  KltFollower follower{wall.camera};
   KltTrack track;
   std::unique_ptr<KltPatches> patches = std::make_unique<KltPatches>();
   FrontendStats stats;
