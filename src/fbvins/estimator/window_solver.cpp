@@ -164,13 +164,13 @@ struct WindowSolver::Descent {
   double predicted_decrease() const { return solver.step_.predicted_decrease; }
   double step_size() const { return solver.step_.size; }
   /// One camera's scale is so weakly known that its information changes with each step.
+  bool keeps_information() const { return solver.images_show_scale_ && !solution.window.calibrating(); }
   bool step_again() {
-    return solver.images_show_scale_ && !solution.window.calibrating() && lambda <= kNegligibleLambda &&
-           solver.step_again(lambda, solution.information);
+    return keeps_information() && lambda <= kNegligibleLambda && solver.step_again(lambda, solution.information);
   }
   double apply_step() {
     move();
-    return solution.window.calibrating() ? cost_of(solution.window, solver.pairs_) : solver.renew_gradient(solution.window);
+    return keeps_information() ? solver.renew_gradient(solution.window) : cost_of(solution.window, solver.pairs_);
   }
   void move() {
     before.save(solution.window);
