@@ -48,25 +48,25 @@ void disc_moments(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_
 /// Sums of squared Sobel gradients over 8x8 pixels from `corner` on. A gradient is at most 4 * 255.
 FBVINS_KERNEL
 void gradient_sums(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_t* xx, std::int32_t* xy, std::int32_t* yy) {
-  constexpr int kSide = 8;
-  std::int16_t smooth[(kSide + 2) * kSide], slope[(kSide + 2) * kSide];  // along each row: 1 2 1 and -1 0 1
-  for (int r = 0; r < kSide + 2; ++r) {
+  constexpr int kBlock = 8;
+  std::int16_t smooth[(kBlock + 2) * kBlock], slope[(kBlock + 2) * kBlock];  // along each row: 1 2 1 and -1 0 1
+  for (int r = 0; r < kBlock + 2; ++r) {
     const std::uint8_t* p = corner + (r - 1) * stride;
-    for (int c = 0; c < kSide; ++c) {
+    for (int c = 0; c < kBlock; ++c) {
       const std::int16_t left = p[c - 1], mid = p[c], right = p[c + 1];
-      smooth[r * kSide + c] = static_cast<std::int16_t>(left + 2 * mid + right);
-      slope[r * kSide + c] = static_cast<std::int16_t>(right - left);
+      smooth[r * kBlock + c] = static_cast<std::int16_t>(left + 2 * mid + right);
+      slope[r * kBlock + c] = static_cast<std::int16_t>(right - left);
     }
   }
-  std::int16_t gx[kSide * kSide], gy[kSide * kSide];
-  for (int i = 0; i < kSide * kSide; ++i) {
-    gx[i] = static_cast<std::int16_t>(slope[i] + 2 * slope[i + kSide] + slope[i + 2 * kSide]);
-    gy[i] = static_cast<std::int16_t>(smooth[i + 2 * kSide] - smooth[i]);
+  std::int16_t gx[kBlock * kBlock], gy[kBlock * kBlock];
+  for (int i = 0; i < kBlock * kBlock; ++i) {
+    gx[i] = static_cast<std::int16_t>(slope[i] + 2 * slope[i + kBlock] + slope[i + 2 * kBlock]);
+    gy[i] = static_cast<std::int16_t>(smooth[i + 2 * kBlock] - smooth[i]);
   }
   std::int32_t a = 0, b = 0, c = 0;
-  for (int i = 0; i < kSide * kSide; ++i) a += gx[i] * gx[i];
-  for (int i = 0; i < kSide * kSide; ++i) b += gx[i] * gy[i];
-  for (int i = 0; i < kSide * kSide; ++i) c += gy[i] * gy[i];
+  for (int i = 0; i < kBlock * kBlock; ++i) a += gx[i] * gx[i];
+  for (int i = 0; i < kBlock * kBlock; ++i) b += gx[i] * gy[i];
+  for (int i = 0; i < kBlock * kBlock; ++i) c += gy[i] * gy[i];
   *xx = a, *xy = b, *yy = c;
 }
 
