@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "fbvins/core/simd.hpp"
 #include "fbvins/estimator/window_equations.hpp"
@@ -78,6 +80,27 @@ void list_blocks(const WindowLayout& at, const WindowLandmark& l, const WindowOb
   if (!host_listed) offsets.push_back(at.pose_row(l.host));
 }
 
+/// Of an observation that can be projected: the point in its camera, the residual, and how much it counts.
+struct WeighedResidual {
+  Vec3 p_C;
+  Vec2 r;
+  double weight;
+};
+
+/// Adds to `cost`, also where the observation cannot be projected.
+inline std::optional<WeighedResidual> weigh(const WindowProblem& w, const CameraGeometry& cameras, const PairGeometry& pair,
+                                            const WindowLandmark& l, const Vec3& x_h, const WindowObservation& o, double& cost) {
+  std::optional<WeighedResidual> out(std::in_place);
+  if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), o, out->p_C, out->r)) {
+    cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
+    return std::nullopt;
+  }
+  const RobustValue robust = huber(out->r.squaredNorm(), w.weights.huber_sigma);
+  cost += robust.cost;
+  out->weight = robust.weight;
+  return out;
+}
+
 /// Linearises the observations of a landmark in one frame, `o` on: one row of Jacobian and residual for each coordinate, weighed
 /// robustly. Adds to `cost`; `o` is the first of another frame afterwards. Returns how many there are.
 template <int Columns>
@@ -87,18 +110,12 @@ int linearise_observations(const WindowProblem& w, const CameraGeometry& cameras
   const int target = o->frame;
   int observations = 0;
   for (; o != end && o->frame == target; ++o) {
-    Vec3 p_C;
-    Vec2 r;
-    if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
-      cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
-      continue;
-    }
-    const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
-    cost += robust.cost;
+    const std::optional<WeighedResidual> seen = weigh(w, cameras, pair, l, x_h, *o, cost);
+    if (!seen) continue;
     double(&observation)[2][Columns] = rows[observations++];
-    fill_jacobian_rows<Columns>(cameras, pair, target == l.host, l, x_h, *o, p_C, r, observation);
-    if (robust.weight < 1) {
-      const double s = std::sqrt(robust.weight);
+    fill_jacobian_rows<Columns>(cameras, pair, target == l.host, l, x_h, *o, seen->p_C, seen->r, observation);
+    if (seen->weight < 1) {
+      const double s = std::sqrt(seen->weight);
       for (int k = 0; k < 2; ++k)
         for (double& x : observation[k]) x *= s;
     }
@@ -205,16 +222,11 @@ double add_landmark_gradient(const WindowProblem& w, const PairTable& pairs, con
     const WindowObservation* begin = w.observations.data() + l.first_observation;
     for (const WindowObservation* o = begin; o != begin + l.observation_count; ++o) {
       const PairGeometry& pair = pairs(l.host, o->frame);
-      Vec3 p_C;
-      Vec2 r;
-      if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
-        cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
-        continue;
-      }
-      const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
-      cost += robust.cost;
-      r *= robust.weight;
-      add_gradient(cameras, pair, l, x_h, *o, p_C, r, of_host, out.dense.segment<6>(at.pose_row(o->frame)), out.landmarks[i]);
+      const std::optional<WeighedResidual> seen = weigh(w, cameras, pair, l, x_h, *o, cost);
+      if (!seen) continue;
+      const Vec2 weighed = seen->weight * seen->r;
+      add_gradient(cameras, pair, l, x_h, *o, seen->p_C, weighed, of_host, out.dense.segment<6>(at.pose_row(o->frame)),
+                   out.landmarks[i]);
     }
     if (l.prior < 0) continue;
     const LandmarkPrior& prior = w.landmark_priors[l.prior];
