@@ -75,8 +75,8 @@ void BoardWatch::work(BoardDetector& detector) {
 }
 
 void BoardWatch::look_at(const StereoFrame& frame, BoardDetector& detector) {
-  for (int k = 0; k < 2 + static_cast<int>(frame.more.size()); ++k) {
-    const std::shared_ptr<const Image> image = frame.image(k);
+  for (int k = 0; k < static_cast<int>(frame.images.size()); ++k) {
+    const std::shared_ptr<const Image>& image = frame.image(k);
     if (!image) continue;
     const BoardDetection seen = detector.find(image->view());
     bool try_mirrored = false;

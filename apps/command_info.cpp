@@ -56,7 +56,7 @@ void print_camera(std::string_view name, const Camera& camera, const CameraInfo&
 
 /// Of the cameras from number 2 on images are counted together.
 void print_further_cameras(const StereoRig& rig, const CameraInfo& info) {
-  if (rig.more.empty()) return;
+  if (rig.camera_count() <= 2) return;
   for (int i = 2; i < rig.camera_count(); ++i) fmt::print("{:<14}{}\n", fmt::format("camera {}", i), lens_of(rig.camera(i)));
   fmt::print("{:<14}{} images together{}\n", "", info.listed, left_out_of(info));
 }
@@ -104,9 +104,9 @@ void print_text(const Dataset& data) {
   fmt::print("{:<14}{} at {:.2f} Hz over {:.2f} s, longest gap {:.3f} s\n", "frames", info.frames, info.image_rate_hz,
              (info.last_image - info.first_image).seconds(), info.longest_image_gap.seconds());
   fmt::print("{:<14}first {} ns, last {} ns\n", "stamps", info.first_image.ns, info.last_image.ns);
-  print_camera("left", data.rig().left, info.left);
-  if (data.rig().has_right()) print_camera("right", data.rig().right, info.right);
-  print_further_cameras(data.rig(), info.more);
+  print_camera("left", data.rig().left(), info.camera(0));
+  if (data.rig().has_right()) print_camera("right", data.rig().right(), info.camera(1));
+  print_further_cameras(data.rig(), info.further());
   if (const auto& depth = data.rig().depth)
     fmt::print("{:<14}{} images, {} to {} m, noise {:.4f} m at 1 m{}\n", "depth", info.depth.listed, depth->nearest_m,
                depth->farthest_m, depth->noise_at_1m_m, depth->own ? ", with a lens and a pose of its own" : "");

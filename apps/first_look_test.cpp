@@ -17,8 +17,8 @@ struct Counted final : SensorInput {
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{.fx = 300, .fy = 300, .cx = 240, .cy = 160}, 480, 320);
-  rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(0.12, 0, 0));
+  rig.cameras.assign(2, {Camera(PinholeRadtan{.fx = 300, .fy = 300, .cx = 240, .cy = 160}, 480, 320), {}});
+  rig.cameras[1].T_BC = Pose<B, C0>(Quat::Identity(), Vec3(0.12, 0, 0));
   return rig;
 }
 
@@ -34,7 +34,7 @@ std::vector<FindingKind> found(const std::function<ImuSample(int)>& readings, Fi
         next, rig(), [&](const Finding& finding) { kinds.push_back(finding.kind); }, longest);
     for (int k = 0; k < 1400; ++k) {
       look.push(readings(k));
-      if (k % 10 == 0) look.push(StereoFrame{readings(k).t, nullptr, nullptr});
+      if (k % 10 == 0) look.push(StereoFrame{readings(k).t});
     }
   }
   return kinds;

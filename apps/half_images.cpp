@@ -43,8 +43,8 @@ bool halve(Camera& camera) {
 }  // namespace
 
 Result<StereoRig> with_half_images(StereoRig rig) {
-  bool done = halve(rig.left) && (!rig.has_right() || halve(rig.right));
-  for (MountedCamera& mounted : rig.more) done = done && halve(mounted.camera);
+  bool done = true;
+  for (MountedCamera& mounted : rig.cameras) done = done && halve(mounted.camera);
   if (rig.depth && rig.depth->own) done = done && halve(rig.depth->own->camera);
   rig.line_delay_s *= 2;
   if (!done) return Error{ErrorCode::invalid_argument, "the images are too small to be halved"};
@@ -52,9 +52,7 @@ Result<StereoRig> with_half_images(StereoRig rig) {
 }
 
 StereoFrame with_half_images(StereoFrame frame) {
-  frame.left = half_of(frame.left);
-  frame.right = half_of(frame.right);
-  for (auto& image : frame.more) image = half_of(image);
+  for (auto& image : frame.images) image = half_of(image);
   frame.depth = half_of(frame.depth);
   return frame;
 }

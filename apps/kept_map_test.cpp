@@ -202,8 +202,8 @@ class MakeKeptMap : public ::testing::Test {
  protected:
   static StereoRig rig() {
     StereoRig r;
-    r.left = r.right = Camera(PinholeRadtan{400, 400, 376, 240}, 752, 480);
-    r.T_BC1.p = Vec3(0.1, 0, 0);
+    r.cameras.assign(2, {Camera(PinholeRadtan{400, 400, 376, 240}, 752, 480), {}});
+    r.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
     return r;
   }
   const test::Folder own_folder{"kept_map"};

@@ -46,8 +46,8 @@ void RecordingWarnings::print(const DatasetInfo& info) {
 
 void RecordingWarnings::print_at_end(const DatasetInfo& info) {
   print(info);
-  const int left = info.left.images.corrupt + info.left.images.wrong_size,
-            right = info.right.images.corrupt + info.right.images.wrong_size;
+  const auto bad = [&](int camera) { return info.camera(camera).images.corrupt + info.camera(camera).images.wrong_size; };
+  const int left = bad(0), right = bad(1);
   if (left + right > 0) warn(fmt::format("{} left and {} right images could not be used", left, right));
 }
 

@@ -93,9 +93,9 @@ Json describe(const Dataset& data) {
                      {"axes", axes_json(rig.imu_noise.axes)}};
   for (const AidingCount& sensor : info.aiding)
     json["aiding"][sensor.name] = Json{{"readings", sensor.readings}, {"rate_hz", sensor.rate_hz}};
-  json["left"] = camera_json(rig, 0, info.left);
-  if (rig.has_right()) json["right"] = camera_json(rig, 1, info.right);
-  if (!rig.more.empty()) json["more"] = more_json(rig, info.more);
+  json["left"] = camera_json(rig, 0, info.camera(0));
+  if (rig.has_right()) json["right"] = camera_json(rig, 1, info.camera(1));
+  if (rig.camera_count() > 2) json["more"] = more_json(rig, info.further());
   if (rig.depth)
     json["depth"] = Json{{"images", info.depth.listed},
                          {"noise_at_1m_m", rig.depth->noise_at_1m_m},

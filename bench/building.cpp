@@ -69,7 +69,7 @@ MapEdge step(const MapKeyframe& from, const MapKeyframe& to) {
 
 int make(const Arguments& a, const Vocabulary& vocabulary) {
   PlaceMap map;
-  map.cameras[0] = test_room::rig().T_BC0;
+  map.cameras[0] = test_room::rig().T_BC0();
   map.vocabulary = vocabulary.fingerprint();
   test_room::World world;
   for (int i = 0; i < a.keyframes; ++i) {

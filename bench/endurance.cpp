@@ -181,8 +181,8 @@ int run(int argc, char** argv) {
     TrackOptions tracks{.recognise = true, .lap_s = setup.lap.length_s};
     if (setup.lap.still) tracks.noise_px = 0.05, tracks.slide_px = tracks.bad_share = 0, tracks.lost_share = 0.002;
     setup.frontend = std::make_unique<TracksFrontend>(simulated, tracks);
-    const auto grey = std::make_shared<const Image>(setup.rig.left.width(), setup.rig.left.height(), std::uint8_t{128});
-    setup.images = {StereoFrame{{}, grey, grey}};
+    const auto grey = std::make_shared<const Image>(setup.rig.left().width(), setup.rig.left().height(), std::uint8_t{128});
+    setup.images = {StereoFrame{{}, {grey, grey}}};
     setup.mapper = std::make_unique<RoomMapper>(flight, loop);
   }
   return fly(wanted, setup, flight) ? 0 : 1;

@@ -35,7 +35,7 @@ inline std::shared_ptr<const Image> faulty_image(Time t, bool right) {
   return image;
 }
 
-inline StereoFrame faulty_frame(Time t) { return {t, faulty_image(t, false), faulty_image(t, true)}; }
+inline StereoFrame faulty_frame(Time t) { return {t, {faulty_image(t, false), faulty_image(t, true)}}; }
 
 /// None of a black, white or blank image.
 inline std::optional<TakenImage> taken(const std::shared_ptr<const Image>& image) {
@@ -72,12 +72,12 @@ class FaultyTracks final : public Frontend {
       : flight_(flight), sigma_px_(options.sigma_px), tracks_(flight, options), fault_(std::move(fault)), begin_(begin) {}
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override {
-    std::optional<TakenImage> left = taken(packet.frame.left), right = taken(packet.frame.right);
+    std::optional<TakenImage> left = taken(packet.frame.left()), right = taken(packet.frame.right());
     TrackedFrame out;
     if (left || right) out = tracks_.frame_at(packet.id, (left ? left : right)->t, prior, (right ? right : left)->t);
     else tracks_.lose_all();
     out.id = packet.id, out.t = packet.frame.t;
-    out.has_left = packet.frame.left != nullptr, out.has_right = packet.frame.right != nullptr;
+    out.cameras = {packet.frame.left() != nullptr, packet.frame.right() != nullptr};
     for (TrackedFeature& f : out.features) {
       const TrackedFeature seen = f;
       f.left = left ? (left->right ? seen.right : seen.left) : std::nullopt;
@@ -100,7 +100,7 @@ class FaultyTracks final : public Frontend {
   }
 
   void spoil(TrackedFeature& f) const {
-    const double w = flight_.rig.left.width(), h = flight_.rig.left.height(), amount = fault_->amount;
+    const double w = flight_.rig.left().width(), h = flight_.rig.left().height(), amount = fault_->amount;
     const auto turn = [&](Vec2 px) {
       const double c = std::cos(amount * kDegree), s = std::sin(amount * kDegree);
       px -= Vec2(w / 2, h / 2);
@@ -123,7 +123,7 @@ class FaultyTracks final : public Frontend {
   }
 
   void cover(std::optional<Observation>& o) const {
-    if (o && o->pixel.x() < fault_->amount * flight_.rig.left.width()) o.reset();
+    if (o && o->pixel.x() < fault_->amount * flight_.rig.left().width()) o.reset();
   }
 
   template <class To>

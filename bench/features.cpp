@@ -144,13 +144,13 @@ struct View {
 /// Share of a's image that b sees as well, if both look at a wall kDepth_m ahead.
 double overlap(const StereoRig& rig, const Pose<W, B>& a, const Pose<W, B>& b) {
   constexpr double kDepth_m = 4;
-  const Pose<C0, C0> T_ba = (b * rig.T_BC0).inverse() * (a * rig.T_BC0);
+  const Pose<C0, C0> T_ba = (b * rig.T_BC0()).inverse() * (a * rig.T_BC0());
   int seen = 0, all = 0;
-  for (int y = 20; y < rig.left.height(); y += 40)
-    for (int x = 20; x < rig.left.width(); x += 40, ++all)
-      if (const auto ray = rig.left.undistort(Vec2(x, y))) {
+  for (int y = 20; y < rig.left().height(); y += 40)
+    for (int x = 20; x < rig.left().width(); x += 40, ++all)
+      if (const auto ray = rig.left().undistort(Vec2(x, y))) {
         const Vec3 p = T_ba * Vec3(kDepth_m * ray->homogeneous());
-        if (const auto px = rig.left.project(p); p.z() > 0.1 && px && rig.left.inside(*px, 0)) ++seen;
+        if (const auto px = rig.left().project(p); p.z() > 0.1 && px && rig.left().inside(*px, 0)) ++seen;
       }
   return static_cast<double>(seen) / all;
 }
@@ -165,26 +165,26 @@ int keyframes(const Arguments& arguments, const std::vector<BoosterWeights>& wei
   std::vector<View> views;
   while (auto event = data.next()) {
     const auto* frame = std::get_if<StereoFrame>(&*event);
-    if (frame == nullptr || !frame->left) continue;
+    if (frame == nullptr || !frame->left()) continue;
     const auto& truth = data.ground_truth();
     const auto at = std::min_element(truth.begin(), truth.end(), [&](const TrajectoryPoint& p, const TrajectoryPoint& q) {
       return std::abs((p.t - frame->t).seconds()) < std::abs((q.t - frame->t).seconds());
     });
     if (at == truth.end() || std::abs((at->t - frame->t).seconds()) > 0.01) continue;
-    views.push_back({at->T_WB, describe(frame->left->view())});
+    views.push_back({at->T_WB, describe(frame->left()->view())});
   }
   const StereoRig& rig = data.rig();
-  const double band = 2.0 / rig.left.focal_px();
+  const double band = 2.0 / rig.left().focal_px();
   std::vector<Score> scores, as_many;
   int pairs = 0;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = i + 1; j < views.size(); ++j) {
       const double shared = std::min(overlap(rig, views[i].T_WB, views[j].T_WB), overlap(rig, views[j].T_WB, views[i].T_WB));
-      const Pose<C0, C0> T_ji = (views[j].T_WB * rig.T_BC0).inverse() * (views[i].T_WB * rig.T_BC0);
+      const Pose<C0, C0> T_ji = (views[j].T_WB * rig.T_BC0()).inverse() * (views[i].T_WB * rig.T_BC0());
       if (shared < 0.2 || shared > 0.7 || T_ji.p.norm() < 0.1) continue;
       const Mat3 E = hat(T_ji.p.normalized()) * T_ji.R();
       const auto in_band = [&](const Vec2& p, const Vec2& q) {
-        const auto a = rig.left.undistort(p), b = rig.left.undistort(q);
+        const auto a = rig.left().undistort(p), b = rig.left().undistort(q);
         if (!a || !b) return false;
         const Vec3 line_b = E * a->homogeneous(), line_a = E.transpose() * b->homogeneous();
         const double product = b->homogeneous().dot(line_b);

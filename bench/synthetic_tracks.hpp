@@ -72,7 +72,7 @@ class SyntheticTracks {
     TrackedFrame out;
     out.id = id;
     out.t = t;
-    out.has_left = out.has_right = true;
+    out.cameras = {true, true};
     const double t_s = (out.t - flight_.start).seconds();
     const Pose<W, B> T_WB = pose(t_s);
     // The drift of G at the prior's own time shifts the predicted positions.
@@ -83,7 +83,7 @@ class SyntheticTracks {
     }
     motion_px_.clear();
     const Pose<W, B> right_T_WB = right_t == t ? T_WB : pose((right_t - flight_.start).seconds());
-    see({T_WB.p, (T_WB * flight_.rig.T_BC0).inverse(), (right_T_WB * flight_.rig.T_BC1).inverse()},
+    see({T_WB.p, (T_WB * flight_.rig.T_BC0()).inverse(), (right_T_WB * flight_.rig.T_BC1()).inverse()},
         prior.valid ? &drift : nullptr, out);
     std::sort(motion_px_.begin(), motion_px_.end());
     if (!motion_px_.empty()) out.stats.median_motion_px = motion_px_[motion_px_.size() / 2];
@@ -148,7 +148,7 @@ class SyntheticTracks {
     f.id = track.id;
     f.age_frames = track.age;
     f.left = left;
-    if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right, now.T_C1W * p_W, track.slide);
+    if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right(), now.T_C1W * p_W, track.slide);
     out.stats.tracked += track.age > 0;
     out.stats.stereo += f.right.has_value();
     if (track.age > 0) motion_px_.push_back((left.pixel - track.seen_at).norm());
@@ -166,14 +166,14 @@ class SyntheticTracks {
 
   void follow(Track& track, const Vec3& p_W, const Instant& now, TrackedFrame& out) {
     track.slide += track.step + o_.slide_px * Vec2(rng_.normal(), rng_.normal());
-    const auto left = observe(flight_.rig.left, now.T_C0W * p_W, track.slide);
+    const auto left = observe(flight_.rig.left(), now.T_C0W * p_W, track.slide);
     if (left && track.slide.norm() < 8) add(track, *left, p_W, now, out);
     else track.followed = false;
   }
 
   void recognise(Track& track, const Vec3& p_W, const Instant& now, TrackedFrame& out) {
     track.slide = 0.3 * Vec2(rng_.normal(), rng_.normal());
-    const auto left = observe(flight_.rig.left, now.T_C0W * p_W, track.slide);
+    const auto left = observe(flight_.rig.left(), now.T_C0W * p_W, track.slide);
     if (!left) return;
     add(track, *left, p_W, now, out);
     ++out.stats.recognised;
@@ -189,7 +189,7 @@ class SyntheticTracks {
       corners[n] = corners.back();
       corners.pop_back();
       const Vec3 p_W = corners_[i];
-      const auto left = observe(flight_.rig.left, now.T_C0W * p_W, Vec2::Zero());
+      const auto left = observe(flight_.rig.left(), now.T_C0W * p_W, Vec2::Zero());
       if (!left) continue;
       Track track;
       track.id = TrackId{next_track_++};

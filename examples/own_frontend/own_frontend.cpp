@@ -57,15 +57,15 @@ class BlockFrontend final : public Frontend {
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override {
     TrackedFrame out;
-    const auto& left = packet.frame.left;
+    const auto& left = packet.frame.left();
     if (!left) return out;
     if (before_) follow(*left, rotation_since(packet, prior));
     detect(*left);
     for (Track& track : tracks_) {
-      std::optional<Observation> seen = observe(rig_.left, track.px, kSigma_px);
+      std::optional<Observation> seen = observe(rig_.left(), track.px, kSigma_px);
       if (!seen) continue;
       out.features.push_back(
-          {track.id, seen, packet.frame.right ? in_right(track, *left, *packet.frame.right) : std::nullopt, track.age++});
+          {track.id, seen, packet.frame.right() ? in_right(track, *left, *packet.frame.right()) : std::nullopt, track.age++});
     }
     before_ = left;
     return out;
@@ -87,14 +87,14 @@ class BlockFrontend final : public Frontend {
           0.5 * (samples[k - 1].gyro_radps + samples[k].gyro_radps) - (prior.valid ? prior.bias.gyro_radps : Vec3::Zero());
       q_before_now = q_before_now * so3_exp(rate * (samples[k].t - samples[k - 1].t).seconds());
     }
-    const Mat3 R_BC = rig_.T_BC0.q.toRotationMatrix();
+    const Mat3 R_BC = rig_.T_BC0().q.toRotationMatrix();
     return R_BC.transpose() * q_before_now.conjugate().toRotationMatrix() * R_BC;
   }
 
   void follow(const Image& now, const Mat3& R) {
     std::erase_if(tracks_, [&](Track& track) {
-      const std::optional<Vec3> ray = rig_.left.ray(track.px);
-      const std::optional<Vec2> expected = ray ? rig_.left.project(R * *ray) : std::nullopt;
+      const std::optional<Vec3> ray = rig_.left().ray(track.px);
+      const std::optional<Vec2> expected = ray ? rig_.left().project(R * *ray) : std::nullopt;
       if (!expected) return true;
       const std::optional<Vec2> found = best_near(now, track.px, *expected);
       if (found) track.px = *found;
@@ -114,14 +114,14 @@ class BlockFrontend final : public Frontend {
 
   /// Along the places that the point would have at every depth.
   std::optional<Observation> in_right(const Track& track, const Image& left, const Image& right) const {
-    const std::optional<Vec3> ray = rig_.left.ray(track.px);
+    const std::optional<Vec3> ray = rig_.left().ray(track.px);
     if (!ray) return std::nullopt;
     const Pose<C1, C0> T_C1C0 = rig_.T_C1C0();
     constexpr int kDepths = 60;
     double best = 1e9;
     int x = 0, y = 0;
     for (int k = 0; k <= kDepths; ++k) {
-      const std::optional<Vec2> px = rig_.right.project(T_C1C0.q * *ray + T_C1C0.p * (k / (kDepths * kNearest_m)));
+      const std::optional<Vec2> px = rig_.right().project(T_C1C0.q * *ray + T_C1C0.p * (k / (kDepths * kNearest_m)));
       if (!px) continue;
       for (int dy = -1; dy <= 1; ++dy) {
         const int px_x = static_cast<int>(std::lround(px->x())), px_y = static_cast<int>(std::lround(px->y())) + dy;
@@ -129,7 +129,7 @@ class BlockFrontend final : public Frontend {
       }
     }
     const std::optional<Vec2> found = best < 1e9 ? refined(left, track.px, right, x, y) : std::nullopt;
-    return found ? observe(rig_.right, *found, kSigma_px) : std::nullopt;
+    return found ? observe(rig_.right(), *found, kSigma_px) : std::nullopt;
   }
 
   /// The strongest corner of each cell of the image that has no track.

@@ -57,8 +57,8 @@ class PyFrontend final : public Frontend {
     if (const nb::object given = found[2]; !given.is_none()) right = checked<double>(given, "right", {n, 2});
     std::vector<TrackedFeature> out;
     for (std::int64_t i = 0; i < n; ++i) {
-      TrackedFeature feature{TrackId{ids.data[i]}, seen(rig_.left, left.data + 2 * i), std::nullopt};
-      if (right && rig_.has_right()) feature.right = seen(rig_.right, right->data + 2 * i);
+      TrackedFeature feature{TrackId{ids.data[i]}, seen(rig_.left(), left.data + 2 * i), std::nullopt};
+      if (right && rig_.has_right()) feature.right = seen(rig_.right(), right->data + 2 * i);
       if (feature.left || feature.right) out.push_back(feature);
     }
     return out;

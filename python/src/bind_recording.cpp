@@ -79,14 +79,14 @@ void bind_measurements(nb::module_& m) {
       .def_prop_ro(
           "t", [](const StereoFrame& f) { return f.t.ns; }, "ns of the cameras' clock")
       .def_prop_ro(
-          "left", [](const StereoFrame& f) { return pixels(f.left); }, "uint8 (height, width), read-only; None: missing")
+          "left", [](const StereoFrame& f) { return pixels(f.left()); }, "uint8 (height, width), read-only; None: missing")
       .def_prop_ro(
-          "right", [](const StereoFrame& f) { return pixels(f.right); }, "uint8 (height, width), read-only; None: missing")
+          "right", [](const StereoFrame& f) { return pixels(f.right()); }, "uint8 (height, width), read-only; None: missing")
       .def_prop_ro(
           "more",
           [](const StereoFrame& f) {
             nb::list out;
-            for (const std::shared_ptr<const Image>& image : f.more) out.append(pixels(image));
+            for (std::size_t i = 2; i < f.images.size(); ++i) out.append(pixels(f.images[i]));
             return out;
           },
           nb::sig("def more(self) -> list[numpy.ndarray | None]"), "the same of the cameras from number 2 on")
@@ -94,7 +94,7 @@ void bind_measurements(nb::module_& m) {
           "offsets",
           [](const StereoFrame& f) {
             std::vector<std::int64_t> out;
-            for (int i = 0; i < 2 + static_cast<int>(f.more.size()); ++i) out.push_back(f.offsets.of(i).ns);
+            for (int i = 0; i < std::max(2, static_cast<int>(f.images.size())); ++i) out.push_back(f.offsets.of(i).ns);
             return out;
           },
           "how long after t each camera took its image, ns: zeros with a common trigger")

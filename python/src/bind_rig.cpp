@@ -249,17 +249,17 @@ void bind_stereo_rig(nb::module_& m) {
           "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset. depth:\n"
           "a DepthSensor, with one camera. more: the cameras from number 2 on, each (Camera, T_BC). line_delay_s: of a rolling\n"
           "shutter, from row to row. time_offset_s and line_delay_s: one number, or one of each camera.")
-      .def_ro("left", &StereoRig::left)
-      .def_ro("right", &StereoRig::right)
+      .def_prop_ro("left", &StereoRig::left)
+      .def_prop_ro("right", &StereoRig::right)
       .def_prop_ro(
-          "T_BC0", [](const StereoRig& rig) { return to_array(rig.T_BC0); }, "(4, 4), left camera to IMU, m")
+          "T_BC0", [](const StereoRig& rig) { return to_array(rig.T_BC0()); }, "(4, 4), left camera to IMU, m")
       .def_prop_ro(
-          "T_BC1", [](const StereoRig& rig) { return to_array(rig.T_BC1); }, "(4, 4), right camera to IMU, m")
+          "T_BC1", [](const StereoRig& rig) { return to_array(rig.T_BC1()); }, "(4, 4), right camera to IMU, m")
       .def_prop_ro(
           "more",
           [](const StereoRig& rig) {
             nb::list out;
-            for (const MountedCamera& mounted : rig.more) out.append(nb::make_tuple(mounted.camera, to_array(mounted.T_BC)));
+            for (int i = 2; i < rig.camera_count(); ++i) out.append(nb::make_tuple(rig.camera(i), to_array(rig.T_BC(i))));
             return out;
           },
           nb::sig("def more(self) -> list[tuple[Camera, numpy.ndarray]]"),
@@ -276,11 +276,11 @@ void bind_stereo_rig(nb::module_& m) {
           "of each camera: of a rolling shutter, from row to row; 0 for a global one")
       .def("__reduce__", [](const StereoRig& rig) { return reduced("rig", nb::cast(rig_to_yaml(rig))); })
       .def("__repr__", [](const StereoRig& rig) {
-        if (!rig.has_right()) return fmt::format("<fbvins.Rig {}, IMU {:g} Hz>", text_of(rig.left), rig.imu_noise.rate_hz);
-        if (!rig.more.empty())
-          return fmt::format("<fbvins.Rig {} and {} further cameras, IMU {:g} Hz>", text_of(rig.left), rig.camera_count() - 1,
+        if (!rig.has_right()) return fmt::format("<fbvins.Rig {}, IMU {:g} Hz>", text_of(rig.left()), rig.imu_noise.rate_hz);
+        if (rig.camera_count() > 2)
+          return fmt::format("<fbvins.Rig {} and {} further cameras, IMU {:g} Hz>", text_of(rig.left()), rig.camera_count() - 1,
                              rig.imu_noise.rate_hz);
-        return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left), text_of(rig.right),
+        return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left()), text_of(rig.right()),
                            rig.T_C1C0().p.norm(), rig.imu_noise.rate_hz);
       });
 }

@@ -55,14 +55,14 @@ class PySystem {
                    const std::vector<std::int64_t>& offsets) {
     const Time stamp{whole_number(t, "t")};
     require_order(stamp, newest_image_, "image");
-    if (more.size() > rig_.more.size())
-      throw nb::value_error(fmt::format("more: the rig has {} further cameras, not {}", rig_.more.size(), more.size()).c_str());
-    std::vector<std::shared_ptr<const Image>> further;
-    for (std::size_t i = 0; i < more.size(); ++i) further.push_back(image_of(more[i], "more", rig_.more[i].camera));
+    const int further = std::max(0, rig_.camera_count() - 2);
+    if (std::cmp_greater(more.size(), further))
+      throw nb::value_error(fmt::format("more: the rig has {} further cameras, not {}", further, more.size()).c_str());
     if (offsets.size() > static_cast<std::size_t>(rig_.camera_count()))
       throw nb::value_error(fmt::format("offsets: the rig has {} cameras, not {}", rig_.camera_count(), offsets.size()).c_str());
-    StereoFrame frame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right), std::move(further),
-                      depth_of(depth, rig_)};
+    StereoFrame frame{
+        stamp, {image_of(left, "left", rig_.left()), image_of(right, "right", rig_.right())}, depth_of(depth, rig_)};
+    for (std::size_t i = 0; i < more.size(); ++i) frame.images.push_back(image_of(more[i], "more", rig_.cameras[i + 2].camera));
     if (frame.without_images()) throw nb::value_error("left, right and more are all None: a frame has an image");
     for (std::size_t i = 0; i < offsets.size(); ++i)
       if (offsets[i] != 0) frame.offsets.set(static_cast<int>(i), Duration{offsets[i]});

@@ -107,7 +107,7 @@ std::vector<std::int64_t> fingerprint(Dataset& data, int stop_after = 1 << 30) {
       const StereoFrame& f = std::get<StereoFrame>(*event);
       out.push_back(-f.t.ns);
       for (int y = 0; y < kToyHeight; ++y)
-        for (int x = 0; x < kToyWidth; ++x) out.push_back(f.left->at(x, y) * 256 + f.right->at(x, y));
+        for (int x = 0; x < kToyWidth; ++x) out.push_back(f.left()->at(x, y) * 256 + f.right()->at(x, y));
     }
     if (std::ssize(out) > stop_after) break;
   }
@@ -165,17 +165,17 @@ std::vector<std::int64_t> left_images(Dataset& data) {
   while (auto event = data.next()) {
     const auto* frame = std::get_if<StereoFrame>(&*event);
     if (frame == nullptr) continue;
-    EXPECT_EQ(frame->right, nullptr);
+    EXPECT_EQ(frame->right(), nullptr);
     out.push_back(frame->t.ns);
     for (int y = 0; y < kToyHeight; ++y)
-      for (int x = 0; x < kToyWidth; ++x) out.push_back(frame->left->at(x, y));
+      for (int x = 0; x < kToyWidth; ++x) out.push_back(frame->left()->at(x, y));
   }
   return out;
 }
 
 TEST_F(ToyDataset, OneCamerasFolderIsARecordingOfThatCamera) {
-  const Pose<B, C0> mounting[2] = {(*open_dataset(path()))->rig().T_BC0,
-                                   (*open_dataset(path()))->rig().T_BC1.cast_frames<B, C0>()};
+  const Pose<B, C0> mounting[2] = {(*open_dataset(path()))->rig().T_BC0(),
+                                   (*open_dataset(path()))->rig().T_BC1().cast_frames<B, C0>()};
   const char* chosen[2] = {"left", "right"};
   for (int camera = 0; camera < 2; ++camera) {
     Files files = toy_dataset();
@@ -185,15 +185,15 @@ TEST_F(ToyDataset, OneCamerasFolderIsARecordingOfThatCamera) {
     auto alone = open_dataset(folder.path() + "/toy");
     ASSERT_TRUE(alone) << alone.error().message;
     EXPECT_FALSE((*alone)->rig().has_right());
-    EXPECT_EQ((*alone)->rig().T_BC0.p, mounting[camera].p);
+    EXPECT_EQ((*alone)->rig().T_BC0().p, mounting[camera].p);
     EXPECT_EQ((*alone)->info().frames, kToyFrames);
-    EXPECT_EQ((*alone)->info().left.unpaired, 0);
+    EXPECT_EQ((*alone)->info().camera(0).unpaired, 0);
     const auto images = left_images(**alone);
     EXPECT_EQ(images.size(), static_cast<std::size_t>(kToyFrames * (1 + kToyWidth * kToyHeight)));
     // The same as one of the two chosen.
     auto of_two = open_dataset(path(), {.camera = chosen[camera]});
     ASSERT_TRUE(of_two);
-    EXPECT_EQ((*of_two)->rig().T_BC0.p, mounting[camera].p);
+    EXPECT_EQ((*of_two)->rig().T_BC0().p, mounting[camera].p);
     EXPECT_EQ(left_images(**of_two), images);
   }
 }
@@ -211,10 +211,10 @@ TEST_F(ToyDataset, TakesAnotherCalibration) {
   auto data = open_dataset(path(), {.kalibr_camchain = camchain, .kalibr_imu = imu});
   ASSERT_TRUE(data) << data.error().message;
   const StereoRig& rig = (*data)->rig();
-  EXPECT_EQ(rig.left.model_name(), "pinhole-equidistant");
-  EXPECT_EQ(rig.right.model_name(), "pinhole-radtan");
-  EXPECT_LT((rig.T_BC0.p - Vec3(-0.5, 0, 0)).norm(), 1e-12);
-  EXPECT_LT((rig.T_BC1.p - Vec3(-0.3, 0, 0)).norm(), 1e-12);
+  EXPECT_EQ(rig.left().model_name(), "pinhole-equidistant");
+  EXPECT_EQ(rig.right().model_name(), "pinhole-radtan");
+  EXPECT_LT((rig.T_BC0().p - Vec3(-0.5, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((rig.T_BC1().p - Vec3(-0.3, 0, 0)).norm(), 1e-12);
   EXPECT_EQ(rig.time_offset_s, 0.012);
   EXPECT_EQ(rig.imu_noise.accel_noise_density_mps2_rthz, 0.01);
   EXPECT_NEAR(rig.image_rate_hz, 20, 1e-9);

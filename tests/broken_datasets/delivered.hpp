@@ -68,10 +68,10 @@ inline std::string deliver(Dataset& data) {
     }
     const StereoFrame& frame = std::get<StereoFrame>(*event);
     EXPECT_GT(frame.t, last_image);
-    EXPECT_TRUE(frame.left || frame.right);
+    EXPECT_TRUE(frame.left() || frame.right());
     last_image = frame.t;
     ++frames;
-    for (auto [image, count] : {std::pair{frame.left.get(), &left}, {frame.right.get(), &right}}) {
+    for (auto [image, count] : {std::pair{frame.left().get(), &left}, {frame.right().get(), &right}}) {
       if (!image) continue;
       EXPECT_EQ(image->width(), kToyWidth);
       EXPECT_EQ(image->height(), kToyHeight);
@@ -81,9 +81,9 @@ inline std::string deliver(Dataset& data) {
   EXPECT_FALSE(data.next()) << "the end stays the end";
   const DatasetInfo& info = data.info();
   return fmt::format("{}/{}/{}/{}", frames, left, right, imu) + (aiding > 0 ? fmt::format("/{}", aiding) : "") +
-         rows_left_out("left", info.left.rows) + rows_left_out("right", info.right.rows) + rows_left_out("imu", info.imu_rows) +
-         rows_left_out("truth", info.ground_truth_rows) + images_left_out("left", info.left) +
-         images_left_out("right", info.right) +
+         rows_left_out("left", info.camera(0).rows) + rows_left_out("right", info.camera(1).rows) +
+         rows_left_out("imu", info.imu_rows) + rows_left_out("truth", info.ground_truth_rows) +
+         images_left_out("left", info.camera(0)) + images_left_out("right", info.camera(1)) +
          (info.frames_without_image > 0 ? fmt::format("; {} empty frames", info.frames_without_image) : "");
 }
 

@@ -22,9 +22,9 @@ inline constexpr std::uint8_t kFirstDot = 200;  // grey value of dot 0; the wall
 /// B is the left camera: x right, y down, z forward.
 inline fbvins::StereoRig rig() {
   fbvins::StereoRig rig;
-  rig.left = rig.right =
-      fbvins::Camera(fbvins::PinholeRadtan{.fx = kFocal_px, .fy = kFocal_px, .cx = 160, .cy = 120}, kWidth, kHeight);
-  rig.T_BC1.p = fbvins::Vec3(kBaseline_m, 0, 0);
+  const fbvins::PinholeRadtan lens{.fx = kFocal_px, .fy = kFocal_px, .cx = 160, .cy = 120};
+  rig.cameras.assign(2, {fbvins::Camera(lens, kWidth, kHeight), {}});
+  rig.cameras[1].T_BC.p = fbvins::Vec3(kBaseline_m, 0, 0);
   return rig;
 }
 
@@ -68,7 +68,7 @@ inline std::vector<fbvins::SensorEvent> flight(int images) {
     const double t_s = 0.005 * k;
     const fbvins::Time t{5'000'000LL * k};
     events.push_back(fbvins::ImuSample{t, fbvins::Vec3::Zero(), fbvins::Vec3(sway_mps2(t_s), -9.81, 0)});
-    if (k % 10 == 0) events.push_back(fbvins::StereoFrame{t, seen_from(sway_m(t_s)), seen_from(sway_m(t_s) + kBaseline_m)});
+    if (k % 10 == 0) events.push_back(fbvins::StereoFrame{t, {seen_from(sway_m(t_s)), seen_from(sway_m(t_s) + kBaseline_m)}});
   }
   return events;
 }

@@ -77,7 +77,7 @@ Flown fly(const std::string& frontend, bool blank, bool depth_meanwhile, const t
       if (!first) first = frame->t;
       const double at_s = (frame->t - *first).seconds();
       if (blank && at_s >= kBlankFrom_s && at_s < kBlankTo_s) {
-        frame->left = plain(*frame->left, rng);
+        frame->set_image(0, plain(*frame->left(), rng));
         if (!depth_meanwhile) frame->depth = nullptr;
       }
     }

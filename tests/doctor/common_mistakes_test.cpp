@@ -35,10 +35,10 @@ TEST(CommonMistakes, AreUndoneByTheirCalibration) {
     for (const SetupFault& injected : setup_faults(right))
       if (injected.name == fault) injected.rig(wrong);
     const StereoRig undone = mistake_with(common_mistakes(wrong), what).rig;
-    EXPECT_LT((undone.T_BC0.p - right.T_BC0.p).norm() + (undone.T_BC1.p - right.T_BC1.p).norm(), 1e-12) << fault;
-    EXPECT_LT((undone.T_BC0.R() - right.T_BC0.R()).norm() + (undone.T_BC1.R() - right.T_BC1.R()).norm(), 1e-12) << fault;
-    EXPECT_NEAR(undone.left.focal_px(), right.left.focal_px(), 1e-9) << fault;
-    EXPECT_NEAR(undone.right.intrinsics()[2], right.right.intrinsics()[2], 1e-9) << fault;
+    EXPECT_LT((undone.T_BC0().p - right.T_BC0().p).norm() + (undone.T_BC1().p - right.T_BC1().p).norm(), 1e-12) << fault;
+    EXPECT_LT((undone.T_BC0().R() - right.T_BC0().R()).norm() + (undone.T_BC1().R() - right.T_BC1().R()).norm(), 1e-12) << fault;
+    EXPECT_NEAR(undone.left().focal_px(), right.left().focal_px(), 1e-9) << fault;
+    EXPECT_NEAR(undone.right().intrinsics()[2], right.right().intrinsics()[2], 1e-9) << fault;
   }
 }
 
@@ -46,8 +46,9 @@ TEST(CommonMistakes, ACameraUpsideDownSeesTheSame) {
   const StereoRig rig = test::synthetic_rig();
   const StereoRig turned = mistake_with(common_mistakes(rig), "upside down").rig;
   const Vec3 p_B(4, 0.3, -0.5);
-  const Vec2 px = *rig.left.project(rig.T_BC0.inverse() * p_B), there = *turned.left.project(turned.T_BC0.inverse() * p_B);
-  EXPECT_LT((px + there - Vec2(rig.left.width() - 1, rig.left.height() - 1)).norm(), 1e-9);
+  const Vec2 px = *rig.left().project(rig.T_BC0().inverse() * p_B),
+             there = *turned.left().project(turned.T_BC0().inverse() * p_B);
+  EXPECT_LT((px + there - Vec2(rig.left().width() - 1, rig.left().height() - 1)).norm(), 1e-9);
 }
 
 TEST(CommonMistakes, AreThoughtOfWhereSomethingIsVeryWrong) {

@@ -56,10 +56,10 @@ double degrees_between(const Mat3& a, const Mat3& b) { return 57.3 * so3_log(Qua
 
 void expect_right(const StereoRig& rig) {
   const StereoRig& right = handheld().rig;
-  EXPECT_LT(degrees_between(rig.T_BC0.R(), right.T_BC0.R()), 0.5);
+  EXPECT_LT(degrees_between(rig.T_BC0().R(), right.T_BC0().R()), 0.5);
   EXPECT_LT(degrees_between(rig.T_C1C0().R(), right.T_C1C0().R()), 0.1);
   EXPECT_LT((rig.T_C1C0().p - right.T_C1C0().p).norm(), 0.04 * right.T_C1C0().p.norm());
-  EXPECT_NEAR(rig.left.focal_px(), right.left.focal_px(), 0.01 * right.left.focal_px());
+  EXPECT_NEAR(rig.left().focal_px(), right.left().focal_px(), 0.01 * right.left().focal_px());
   EXPECT_NEAR(rig.time_offset_s, right.time_offset_s, 1e-3);
 }
 
@@ -90,14 +90,14 @@ TEST(DoctorCorrects, TransformsInTheOtherDirection) {
 TEST(DoctorCorrects, ImagesUpsideDownByTheCalibrationOfSuchImages) {
   const CorrectedRig found = corrected("images upside down");
   ASSERT_TRUE(found.rig) << found.why_not;
-  EXPECT_NEAR(degrees_between(found.rig->T_BC0.R(), handheld().rig.T_BC0.R()), 180, 0.5);
+  EXPECT_NEAR(degrees_between(found.rig->T_BC0().R(), handheld().rig.T_BC0().R()), 180, 0.5);
   EXPECT_TRUE(found.after.findings.empty()) << to_text(found.after);
 }
 
 TEST(DoctorCorrects, WhatIsJudgedAndSaysWhatIsNot) {
   const CorrectedRig found = corrected("mounting wrong by 4 degrees and baseline 12 % too long");
   ASSERT_TRUE(found.rig) << found.why_not;
-  EXPECT_LT(degrees_between(found.rig->T_BC0.R(), handheld().rig.T_BC0.R()), 0.5);
+  EXPECT_LT(degrees_between(found.rig->T_BC0().R(), handheld().rig.T_BC0().R()), 0.5);
   // The rig hardly accelerates, which the length of the baseline would be seen by.
   EXPECT_NE(to_text(found.after).find("length of the baseline: the rig hardly accelerated"), std::string::npos);
 }
@@ -110,7 +110,7 @@ TEST(DoctorCorrects, MoreAccuratelyThanItMeasures) {
 
 TEST(DoctorCorrects, TheLensesOfAnotherImageSize) {
   const StereoRig& images = handheld().rig;
-  const ImageSize size{images.left.width(), images.left.height()}, twice{2 * size.width, 2 * size.height};
+  const ImageSize size{images.left().width(), images.left().height()}, twice{2 * size.width, 2 * size.height};
   const std::vector<ScaledLens> scaled{{0, twice, size}, {1, twice, size}};
   Diagnosis diagnosis = *diagnose(images, handheld().replay(), CalibrationStyle::kalibr);
   tell_of_scaled(scaled, CalibrationStyle::kalibr, diagnosis);
@@ -122,7 +122,7 @@ TEST(DoctorCorrects, TheLensesOfAnotherImageSize) {
   const Result<CorrectedRig> found = correct_rig(images, diagnosis, handheld().replay(), CalibrationStyle::kalibr);
   ASSERT_TRUE(found && found->rig) << found->why_not;
   EXPECT_TRUE(found->after.findings.empty()) << to_text(found->after);
-  EXPECT_EQ(found->rig->left.intrinsics(), images.left.intrinsics());
+  EXPECT_EQ(found->rig->left().intrinsics(), images.left().intrinsics());
 }
 
 TEST(DoctorCorrects, NothingWhereNoCalibrationHelps) {
@@ -139,7 +139,7 @@ TEST(DoctorCorrects, NothingThatIsJudgedNoBetter) {
   // The lines of another rig, as a wrong diagnosis would have them.
   const Replay replay = handheld().replay();
   Diagnosis wrong = *diagnose(handheld().rig, replay, CalibrationStyle::kalibr);
-  wrong.rig.T_BC1.p += Vec3(0, 0.02, 0.03);
+  wrong.rig.cameras[1].T_BC.p += Vec3(0, 0.02, 0.03);
   Finding finding;
   finding.kind = FindingKind::baseline_length;
   finding.fields = {CalibrationField::mounting_of_right};

@@ -40,8 +40,8 @@ Evidence spoilt(const SetupFault& fault) {
   Evidence evidence = good();
   if (fault.rig) fault.rig(evidence.rig);
   const double longer = evidence.rig.T_C1C0().p.norm() / evidence.working_rig.T_C1C0().p.norm();
-  Vec3& p_BC1 = evidence.working_rig.T_BC1.p;
-  p_BC1 = evidence.working_rig.T_BC0.p + longer * (p_BC1 - evidence.working_rig.T_BC0.p);
+  Vec3& p_BC1 = evidence.working_rig.cameras[1].T_BC.p;
+  p_BC1 = evidence.working_rig.T_BC0().p + longer * (p_BC1 - evidence.working_rig.T_BC0().p);
   for (SeenFrame& frame : evidence.frames)
     for (SeenFeature& feature : frame.features) feature.inverse_depth /= longer;
   if (fault.reading)
@@ -251,11 +251,11 @@ void expect_named(const Evidence& evidence, FindingKind kind, double size, doubl
 
 TEST(Doctor, MeasuresTheDirectionOfTheBaseline) {
   Evidence evidence = good();
-  const Vec3 left = evidence.rig.T_BC0.p, true_right = evidence.rig.T_BC1.p;
-  evidence.rig.T_BC1.p = left + so3_exp(Vec3(4 * kDegree, 0, 0)) * (true_right - left);
+  const Vec3 left = evidence.rig.T_BC0().p, true_right = evidence.rig.T_BC1().p;
+  evidence.rig.cameras[1].T_BC.p = left + so3_exp(Vec3(4 * kDegree, 0, 0)) * (true_right - left);
   expect_named(evidence, FindingKind::baseline_direction, 4, 0.4);
   const StereoRig corrected = examine(evidence).rig;
-  EXPECT_LT((corrected.T_BC1.p - true_right).norm(), 1.5e-3);
+  EXPECT_LT((corrected.T_BC1().p - true_right).norm(), 1.5e-3);
 }
 
 TEST(Doctor, SaysWhereMatchesLieFarFromTheirLinesForNoSingleReason) {
@@ -300,7 +300,7 @@ TEST(DoctorOfOneCamera, NamesTimes) {
 
 TEST(DoctorOfOneCamera, NamesMountingAndGyroscope) {
   Evidence turned = one_camera();
-  turned.rig.T_BC0.q = (so3_exp(Vec3(0.05, -0.03, 0.04)) * turned.rig.T_BC0.q).normalized();
+  turned.rig.cameras[0].T_BC.q = (so3_exp(Vec3(0.05, -0.03, 0.04)) * turned.rig.T_BC0().q).normalized();
   expect_named(turned, FindingKind::imu_camera_rotation, 4.05, 0.6);
   Evidence scaled = one_camera(), biased = one_camera(), exchanged = one_camera(), degrees = one_camera();
   for (ImuSample& sample : scaled.imu) sample.gyro_radps *= 1.08;

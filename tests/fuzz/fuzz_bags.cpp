@@ -28,8 +28,8 @@ namespace {
 
 StereoRig small_rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{9, 9, 4, 3}, 8, 6);
-  rig.T_BC1.p.x() = 0.1;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{9, 9, 4, 3}, 8, 6), {}});
+  rig.cameras[1].T_BC.p.x() = 0.1;
   return rig;
 }
 
@@ -101,7 +101,7 @@ std::vector<std::string> bag_seeds() {
   auto bag = Ros1BagWriter::create(path, small_rig(), Time{0});
   const auto image = std::make_shared<const Image>(8, 6, std::uint8_t{7});
   for (std::int64_t i = 0; i < 3; ++i)
-    require(bag->add(ImuSample{Time{1000 * i}}).ok() && bag->add(StereoFrame{Time{1000 * i}, image, image}).ok());
+    require(bag->add(ImuSample{Time{1000 * i}}).ok() && bag->add(StereoFrame{Time{1000 * i}, {image, image}}).ok());
   require(bag->finish().ok());
   const std::string bag_bytes = *read_file(path, 1u << 20u), mcap = small_mcap(folder.path() + "/flight.mcap");
   return {bag_bytes,

@@ -18,8 +18,8 @@ std::string bytes_of(std::uint32_t type, Struct message, std::size_t size = size
 
 SocketRig seed_rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625}, 64, 48);
-  rig.T_BC1.p.x() = 0.125;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625}, 64, 48), {}});
+  rig.cameras[1].T_BC.p.x() = 0.125;
   return socket_rig(rig);
 }
 

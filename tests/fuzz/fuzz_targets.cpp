@@ -126,8 +126,8 @@ std::vector<std::string> mcap_seeds() {
   const test::TemporaryFolder folder;
   const std::string path = folder.path() + "/flight.mcap", bare_path = folder.path() + "/bare.mcap";
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{9, 9, 4, 3}, 8, 6);
-  rig.T_BC1.p.x() = 0.1;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{9, 9, 4, 3}, 8, 6), {}});
+  rig.cameras[1].T_BC.p.x() = 0.1;
   auto record = FlightRecord::create(path, rig);
   auto bare = McapWriter::create(
       bare_path, {}, {{std::string(kImuTopic), "", ""}, {std::string(kLeftTopic), "", ""}, {std::string(kRightTopic), "", ""}});
@@ -135,7 +135,7 @@ std::vector<std::string> mcap_seeds() {
   const auto image = std::make_shared<const Image>(8, 6, std::uint8_t{7});
   for (std::int64_t i = 0; i < 3; ++i) {
     const ImuSample sample{Time{1000 * i}};
-    require(record->add(sample).ok() && record->add(StereoFrame{sample.t, image, image}).ok());
+    require(record->add(sample).ok() && record->add(StereoFrame{sample.t, {image, image}}).ok());
     append_imu(bare->begin_message(0, sample.t), sample, rig.imu_noise);
     bare->end_message();
     for (const std::size_t camera : {1, 2}) {
@@ -209,8 +209,8 @@ void fuzz_calibration(std::string_view bytes) {
   if (imu) require(imu->noise.gyro_noise_density_radps_rthz > 0);
   const auto rig = parse_kalibr_camchain(yaml);
   require_sentence(rig);
-  if (rig) require_rigid(rig->T_BC0);
-  if (rig) require_rigid(rig->T_BC1);
+  if (rig) require_rigid(rig->T_BC0());
+  if (rig) require_rigid(rig->T_BC1());
   require_sentence(parse_imu(yaml));
 }
 
@@ -280,13 +280,13 @@ void fuzz_mcap(std::string_view bytes) {
   auto contents = read_mcap(bytes_in_memory(std::string(bytes)), "flight.mcap", {.prefetch_frames = 0});
   require_sentence(contents);
   if (!contents) return;
-  require_rigid(contents->rig.T_BC1);
+  require_rigid(contents->rig.T_BC1());
   for (const ImuSample& sample : contents->imu) require(sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite());
-  const int width = contents->rig.left.width(), height = contents->rig.left.height();
+  const int width = contents->rig.left().width(), height = contents->rig.left().height();
   Dataset data(*std::move(contents), {.prefetch_frames = 0});
   while (const auto event = data.next())
-    if (const auto* frame = std::get_if<StereoFrame>(&*event); frame != nullptr && frame->left)
-      require(frame->left->width() == width && frame->left->height() == height);
+    if (const auto* frame = std::get_if<StereoFrame>(&*event); frame != nullptr && frame->left())
+      require(frame->left()->width() == width && frame->left()->height() == height);
 }
 
 void fuzz_motion_capture(std::string_view bytes) {

@@ -67,7 +67,7 @@ TEST_P(Flight, ASecondWithoutImages) {
 
 TEST_P(Flight, ASecondOfFramesWithoutImages) {
   const Flown flown = fly_altered([&](double t_s, SensorEvent& e) {
-    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 1.0)) frame->left = frame->right = nullptr;
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 1.0)) frame->images.clear();
     return true;
   });
   EXPECT_GT(count_during(flown, HealthState::degraded, 1.0), 15);
@@ -87,7 +87,8 @@ TEST_P(Flight, HalfASecondWithoutReadings) {
 
 TEST_P(Flight, ThreeSecondsOfABlackRightCamera) {
   const Flown flown = fly_altered([&](double t_s, SensorEvent& e) {
-    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 3.0)) frame->right = std::make_shared<Image>(752, 480);
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 3.0))
+      frame->set_image(1, std::make_shared<Image>(752, 480));
     return true;
   });
   EXPECT_GT(count_during(flown, HealthState::degraded, 3.0), 50);
@@ -96,7 +97,8 @@ TEST_P(Flight, ThreeSecondsOfABlackRightCamera) {
 
 TEST_P(Flight, ThreeSecondsOfABlackLeftCamera) {
   const Flown flown = fly_altered([&](double t_s, SensorEvent& e) {
-    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 3.0)) frame->left = std::make_shared<Image>(752, 480);
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 3.0))
+      frame->set_image(0, std::make_shared<Image>(752, 480));
     return true;
   });
   EXPECT_EQ(flown.count(HealthState::good, recording().fails_s + 0.3, recording().fails_s + 2.9), 0);
@@ -112,7 +114,7 @@ TEST_P(Flight, ThreeSecondsOfABlackLeftCamera) {
 TEST_P(Flight, TwoSecondsTenTimesAsBright) {
   const Flown flown = fly_altered([&](double t_s, SensorEvent& e) {
     if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 2.0))
-      frame->left = brightened(*frame->left, 10), frame->right = brightened(*frame->right, 10);
+      frame->set_image(0, brightened(*frame->left(), 10)), frame->set_image(1, brightened(*frame->right(), 10));
     return true;
   });
   expect_recovered(flown, 2.0, 0.05);
@@ -121,7 +123,7 @@ TEST_P(Flight, TwoSecondsTenTimesAsBright) {
 TEST_P(Flight, TwoSecondsATenthAsBright) {
   const Flown flown = fly_altered([&](double t_s, SensorEvent& e) {
     if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 2.0))
-      frame->left = brightened(*frame->left, 0.1), frame->right = brightened(*frame->right, 0.1);
+      frame->set_image(0, brightened(*frame->left(), 0.1)), frame->set_image(1, brightened(*frame->right(), 0.1));
     return true;
   });
   expect_recovered(flown, 2.0, 0.05);
@@ -144,8 +146,8 @@ TEST_P(Flight, OneCameraAloneIsEnough) {
   for (const bool right : {false, true}) {
     const Alter alone = [&](double, SensorEvent& event) {
       if (auto* frame = std::get_if<StereoFrame>(&event)) {
-        if (right) frame->left = frame->right;
-        frame->right = nullptr;
+        if (right) frame->set_image(0, frame->right());
+        frame->set_image(1, nullptr);
       }
       return true;
     };
@@ -179,10 +181,10 @@ TEST_P(Flight, CalibrationIsRefinedInFlight) {
   StereoRig truth;
   const auto loosen = [&](StereoRig& rig) {
     truth = rig;
-    rig.T_BC0 = {turn * rig.T_BC0.q, Vec3(turn * rig.T_BC0.p + shift)};
-    rig.T_BC1 = {turn * rig.T_BC1.q, Vec3(turn * rig.T_BC1.p + shift)};
+    rig.cameras[0].T_BC = {turn * rig.T_BC0().q, Vec3(turn * rig.T_BC0().p + shift)};
+    rig.cameras[1].T_BC = {turn * rig.T_BC1().q, Vec3(turn * rig.T_BC1().p + shift)};
   };
-  const auto wrong_rad = [&](const Flown& f) { return so3_log(truth.T_BC0.q.conjugate() * f.calibration.T_BC0.q).norm(); };
+  const auto wrong_rad = [&](const Flown& f) { return so3_log(truth.T_BC0().q.conjugate() * f.calibration.T_BC0().q).norm(); };
   SystemOptions config = config_for(frontend());
   const Flown off = fly(path(), config, nullptr, loosen);
   EXPECT_NEAR(wrong_rad(off), 0.0349, 1e-4);

@@ -63,8 +63,8 @@ void publish(const SensorEvent& event) {
     return publish("/imu", message);
   }
   const auto& frame = std::get<StereoFrame>(event);
-  publish(kImages[0], message_of(*frame.left, frame.t, 0));
-  publish(kImages[1], message_of(*frame.right, frame.t + frame.offsets.of(1), 8));  // rows with a gap are copied
+  publish(kImages[0], message_of(*frame.left(), frame.t, 0));
+  publish(kImages[1], message_of(*frame.right(), frame.t + frame.offsets.of(1), 8));  // rows with a gap are copied
 }
 
 rclcpp::NodeOptions parameters(const KalibrFiles& files) {

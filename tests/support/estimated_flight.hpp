@@ -80,15 +80,14 @@ struct FourCameras {
 
   FourCameras(const Motion& motion, std::uint64_t seed) : front(motion, seed), back(motion, seed + 1000), rig(front.rig) {
     const Pose<B, B> turned(so3_exp(Vec3(0, 0, std::numbers::pi)), Vec3::Zero());
-    back.rig.T_BC0 = turned * back.rig.T_BC0;
-    back.rig.T_BC1 = turned * back.rig.T_BC1;
-    rig.more = {back.rig.mounted(0), back.rig.mounted(1)};
+    for (MountedCamera& mounted : back.rig.cameras) mounted.T_BC = turned * mounted.T_BC;
+    rig.cameras.insert(rig.cameras.end(), {back.rig.mounted(0), back.rig.mounted(1)});
   }
   NavState<W> truth(int k) const { return front.truth(k); }
   TrackedFrame frame(int k) {
     TrackedFrame out = front.frame(k);
     const TrackedFrame other = back.frame(k);
-    out.has_more = {other.has_left, other.has_right};
+    out.set_has(2, other.has(0)), out.set_has(3, other.has(1));
     out.stats.stereo += other.stats.stereo;
     for (TrackedFeature feature : other.features) {
       feature.id.value += 1'000'000;

@@ -20,10 +20,11 @@ struct FlightSceneOptions {
 
 inline StereoRig flight_scene_rig() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{458.7, 457.3, 367.2, 248.4, -0.2834, 0.0740, 1.9e-4, 1.8e-5}, 752, 480);
-  rig.right = Camera(PinholeRadtan{457.6, 456.1, 379.9, 255.2, -0.2837, 0.0745, -1e-4, -3.6e-5}, 752, 480);
-  rig.T_BC0 = {so3_exp(Vec3(0.05, 0.02, 1.55)), Vec3(-0.021, -0.065, 0.0098)};
-  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>() * Pose<C1, C1>(so3_exp(Vec3(-0.002, 0.014, 0.001)), Vec3(0.11, 0.0004, 0.001));
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = Camera(PinholeRadtan{458.7, 457.3, 367.2, 248.4, -0.2834, 0.0740, 1.9e-4, 1.8e-5}, 752, 480);
+  rig.cameras[1].camera = Camera(PinholeRadtan{457.6, 456.1, 379.9, 255.2, -0.2837, 0.0745, -1e-4, -3.6e-5}, 752, 480);
+  rig.cameras[0].T_BC = {so3_exp(Vec3(0.05, 0.02, 1.55)), Vec3(-0.021, -0.065, 0.0098)};
+  rig.cameras[1].T_BC = rig.T_BC0() * Pose<C0, C0>(so3_exp(Vec3(-0.002, 0.014, 0.001)), Vec3(0.11, 0.0004, 0.001));
   rig.time_offset_s = 0.004;
   return rig;
 }

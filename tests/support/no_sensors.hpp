@@ -9,8 +9,8 @@ namespace fbvins::app::test {
 class NoSensors final : public Source {
  public:
   NoSensors() {
-    rig_.left = rig_.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-    rig_.T_BC1.p = Vec3(0.1, 0, 0);
+    rig_.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24), {}});
+    rig_.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   }
   const StereoRig& rig() const override { return rig_; }
   Result<void> run(SensorInput&) override { return {}; }

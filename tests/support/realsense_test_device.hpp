@@ -23,10 +23,11 @@ inline constexpr Time kStart{1'700'000'000'000 * kMs};
 /// A D435i by its factory calibration: the infrared cameras and the IMU.
 inline StereoRig rig() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
-  rig.right = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
-  rig.T_BC0 = {Quat::Identity(), Vec3(0.00552, -0.0051, -0.01174)};
-  rig.T_BC1 = {Quat::Identity(), Vec3(0.00552 + 0.05, -0.0051, -0.01174)};
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
+  rig.cameras[1].camera = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
+  rig.cameras[0].T_BC = {Quat::Identity(), Vec3(0.00552, -0.0051, -0.01174)};
+  rig.cameras[1].T_BC = {Quat::Identity(), Vec3(0.00552 + 0.05, -0.0051, -0.01174)};
   rig.image_rate_hz = 30;
   return rig;
 }
@@ -48,21 +49,21 @@ class SoftwareCamera {
     stereo_.add_option(RS2_OPTION_AUTO_EXPOSURE_LIMIT, {1, 200000, 33000, 1});
     stereo_.add_option(RS2_OPTION_AUTO_EXPOSURE_LIMIT_TOGGLE, {0, 1, 0, 1});
     const int rate_hz = static_cast<int>(rig.image_rate_hz), imu_rate_hz = static_cast<int>(rig.imu_noise.rate_hz);
-    left_ = stereo_.add_video_stream(video_stream(1, rig.left, rate_hz));
-    right_ = stereo_.add_video_stream(video_stream(2, rig.right, rate_hz));
+    left_ = stereo_.add_video_stream(video_stream(1, rig.left(), rate_hz));
+    right_ = stereo_.add_video_stream(video_stream(2, rig.right(), rate_hz));
     depth_ = stereo_.add_video_stream(depth_stream(rig.depth_camera(), rate_hz));
     stereo_.add_read_only_option(RS2_OPTION_DEPTH_UNITS, 0.0001f);
     stereo_.add_read_only_option(RS2_OPTION_STEREO_BASELINE, 95);
     for (int index : {1, 2}) wide_[index - 1] = stereo_.add_video_stream(wide_stream(index));
     gyro_ = motion_.add_motion_stream({RS2_STREAM_GYRO, 0, 3, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
     accel_ = motion_.add_motion_stream({RS2_STREAM_ACCEL, 0, 4, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
-    left_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
-    right_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
-    const Pose<B, C0> T_BD = rig.depth && rig.depth->own ? rig.depth->own->T_BC : rig.T_BC0;
+    left_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC0()));
+    right_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC1()));
+    const Pose<B, C0> T_BD = rig.depth && rig.depth->own ? rig.depth->own->T_BC : rig.T_BC0();
     depth_.register_extrinsics_to(gyro_, extrinsics(T_BD));
-    depth_.register_extrinsics_to(left_, extrinsics(rig.T_BC0.inverse() * T_BD));
-    wide_[0].register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
-    wide_[1].register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
+    depth_.register_extrinsics_to(left_, extrinsics(rig.T_BC0().inverse() * T_BD));
+    wide_[0].register_extrinsics_to(gyro_, extrinsics(rig.T_BC0()));
+    wide_[1].register_extrinsics_to(gyro_, extrinsics(rig.T_BC1()));
     accel_.register_extrinsics_to(gyro_, extrinsics(Pose<B, B>()));
   }
 

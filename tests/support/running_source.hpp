@@ -22,8 +22,8 @@ inline constexpr std::int64_t kMs = 1'000'000;
 
 inline StereoRig small_rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{100, 100, 31.5, 23.5, 0, 0, 0, 0}, 64, 48);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{100, 100, 31.5, 23.5, 0, 0, 0, 0}, 64, 48), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   return rig;
 }
 

@@ -16,9 +16,9 @@ SetupFault calibration_turned(std::string name, const Vec3& axis, double degrees
           degrees,
           kRotationTolerance_deg,
           [axis, degrees](StereoRig& rig) {
-            const auto T_C0C1 = rig.T_BC0.inverse() * rig.T_BC1;
-            rig.T_BC0 = {Mat3(turn(axis, degrees) * rig.T_BC0.R()), rig.T_BC0.p};
-            rig.T_BC1 = rig.T_BC0 * T_C0C1;
+            const auto T_C0C1 = rig.T_BC0().inverse() * rig.T_BC1();
+            rig.cameras[0].T_BC = {Mat3(turn(axis, degrees) * rig.T_BC0().R()), rig.T_BC0().p};
+            rig.cameras[1].T_BC = (rig.T_BC0() * T_C0C1).cast_frames<B, C0>();
           },
           {},
           {}};
@@ -29,7 +29,7 @@ SetupFault right_turned(std::string name, const Vec3& axis, double degrees) {
           degrees,
           std::max(kTenth * degrees, 0.05),
           [axis, degrees](StereoRig& rig) {
-            rig.T_BC1 = {Mat3(rig.T_BC1.R() * turn(axis, degrees)), rig.T_BC1.p};
+            rig.cameras[1].T_BC = {Mat3(rig.T_BC1().R() * turn(axis, degrees)), rig.T_BC1().p};
           },
           {},
           {}};
@@ -41,8 +41,8 @@ SetupFault focal(std::string name, bool left, bool right, double factor) {
           percent,
           kTenth * std::abs(percent),
           [=](StereoRig& rig) {
-            if (left) rig.left = changed(rig.left, {.log_focal = std::log(factor)});
-            if (right) rig.right = changed(rig.right, {.log_focal = std::log(factor)});
+            if (left) rig.cameras[0].camera = changed(rig.left(), {.log_focal = std::log(factor)});
+            if (right) rig.cameras[1].camera = changed(rig.right(), {.log_focal = std::log(factor)});
           },
           {},
           {}};
@@ -53,7 +53,7 @@ SetupFault baseline(std::string name, double factor, const StereoRig& rig) {
           FindingKind::baseline_length,
           wrong_mm,
           kTenth * std::abs(wrong_mm),
-          [factor](StereoRig& r) { r.T_BC1.p = r.T_BC0.p + factor * (r.T_BC1.p - r.T_BC0.p); },
+          [factor](StereoRig& r) { r.cameras[1].T_BC.p = r.T_BC0().p + factor * (r.T_BC1().p - r.T_BC0().p); },
           {},
           {}};
 }
@@ -68,26 +68,29 @@ SetupFault changed_by(std::string name, FindingKind kind, std::function<void(Ste
 }
 
 std::vector<SetupFault> inverted() {
-  const auto left = [](const StereoRig& r) { return r.T_BC0.inverse().cast_frames<B, C0>(); };
-  const auto right = [](const StereoRig& r) { return r.T_BC1.inverse().cast_frames<B, C1>(); };
+  const auto left = [](const StereoRig& r) { return r.T_BC0().inverse().cast_frames<B, C0>(); };
+  const auto right = [](const StereoRig& r) { return r.T_BC(1).inverse().cast_frames<B, C0>(); };
   constexpr FindingKind kKind = FindingKind::extrinsics_inverted;
   return {
-      changed_by("both transforms to the IMU inverted", kKind, [=](StereoRig& r) { r.T_BC0 = left(r), r.T_BC1 = right(r); }),
+      changed_by("both transforms to the IMU inverted", kKind,
+                 [=](StereoRig& r) { r.cameras[0].T_BC = left(r), r.cameras[1].T_BC = right(r); }),
       changed_by("left transform to the IMU inverted, the right camera beside it", kKind,
                  [=](StereoRig& r) {
-                   const auto T_C0C1 = r.T_BC0.inverse() * r.T_BC1;
-                   r.T_BC0 = left(r);
-                   r.T_BC1 = r.T_BC0 * T_C0C1;
+                   const auto T_C0C1 = r.T_BC0().inverse() * r.T_BC1();
+                   r.cameras[0].T_BC = left(r);
+                   r.cameras[1].T_BC = (r.T_BC0() * T_C0C1).cast_frames<B, C0>();
                  }),
-      changed_by("right transform to the IMU inverted", kKind, [=](StereoRig& r) { r.T_BC1 = right(r); }),
+      changed_by("right transform to the IMU inverted", kKind, [=](StereoRig& r) { r.cameras[1].T_BC = right(r); }),
       changed_by("transform from camera to camera inverted", kKind,
-                 [](StereoRig& r) { r.T_BC1 = r.T_BC0 * r.T_C1C0().cast_frames<C0, C1>(); }),
+                 [](StereoRig& r) { r.cameras[1].T_BC = (r.T_BC0() * r.T_C1C0().cast_frames<C0, C1>()).cast_frames<B, C0>(); }),
   };
 }
 
 std::vector<SetupFault> of_another_kind() {
   const auto sized = [](double factor) {
-    return [factor](StereoRig& r) { r.left = with_scaled_lens(r.left, factor), r.right = with_scaled_lens(r.right, factor); };
+    return [factor](StereoRig& r) {
+      r.cameras[0].camera = with_scaled_lens(r.left(), factor), r.cameras[1].camera = with_scaled_lens(r.right(), factor);
+    };
   };
   const auto noise = [](double factor) {
     return [factor](StereoRig& r) {
@@ -100,12 +103,12 @@ std::vector<SetupFault> of_another_kind() {
       changed_by("lenses of a calibration at twice the size", FindingKind::calibration_size, sized(2)),
       changed_by("lenses exchanged", FindingKind::swapped_images,
                  [](StereoRig& r) {
-                   const LensModel left = r.left.model();
-                   r.left = r.left.with_lens(r.right.model()), r.right = r.right.with_lens(left);
+                   const LensModel left = r.left().model();
+                   r.cameras[0].camera = r.left().with_lens(r.right().model()), r.cameras[1].camera = r.right().with_lens(left);
                  }),
       changed_by(
           "cameras 10 cm from where they are on the IMU", FindingKind::imu_camera_position,
-          [](StereoRig& r) { r.T_BC0.p += Vec3(0.06, 0, 0.08), r.T_BC1.p += Vec3(0.06, 0, 0.08); }, 10, 3),
+          [](StereoRig& r) { r.cameras[0].T_BC.p += Vec3(0.06, 0, 0.08), r.cameras[1].T_BC.p += Vec3(0.06, 0, 0.08); }, 10, 3),
       changed_by(
           "time offset of the calibration 50 ms off", FindingKind::time_offset, [](StereoRig& r) { r.time_offset_s += 0.05; },
           -50, kTimeTolerance_ms),
@@ -114,14 +117,14 @@ std::vector<SetupFault> of_another_kind() {
       changed_by(
           "left principal point off by (-25, 10)", FindingKind::principal_point,
           [](StereoRig& r) {
-            r.left = changed(r.left, {.centre_px = {-25, 10}});
+            r.cameras[0].camera = changed(r.left(), {.centre_px = {-25, 10}});
           },
           std::hypot(25, 10), kTenth * std::hypot(25, 10)),
       changed_by(
           "mounting wrong by 4 degrees and baseline 12 % too long", FindingKind::imu_camera_rotation,
           [](StereoRig& r) {
             calibration_turned("", Vec3::UnitX(), 4).rig(r);
-            r.T_BC1.p = r.T_BC0.p + 1.12 * (r.T_BC1.p - r.T_BC0.p);
+            r.cameras[1].T_BC.p = r.T_BC0().p + 1.12 * (r.T_BC1().p - r.T_BC0().p);
           },
           4, kRotationTolerance_deg),
   };
@@ -144,19 +147,31 @@ std::vector<SetupFault> of_the_calibration(const StereoRig& rig) {
        std::hypot(20, 12),
        0.1 * std::hypot(20, 12),
        [](StereoRig& r) {
-         r.right = changed(r.right, {.centre_px = {20, 12}});
+         r.cameras[1].camera = changed(r.right(), {.centre_px = {20, 12}});
        },
        {},
        {}},
-      {"left lens without distortion", FindingKind::distortion, 0, 0, [](StereoRig& r) { forget_distortion(r.left); }, {}, {}},
+      {"left lens without distortion",
+       FindingKind::distortion,
+       0,
+       0,
+       [](StereoRig& r) { forget_distortion(r.cameras[0].camera); },
+       {},
+       {}},
       {"both lenses without distortion",
        FindingKind::distortion,
        0,
        0,
-       [](StereoRig& r) { forget_distortion(r.left), forget_distortion(r.right); },
+       [](StereoRig& r) { forget_distortion(r.cameras[0].camera), forget_distortion(r.cameras[1].camera); },
        {},
        {}},
-      {"right lens without distortion", FindingKind::distortion, 0, 0, [](StereoRig& r) { forget_distortion(r.right); }, {}, {}},
+      {"right lens without distortion",
+       FindingKind::distortion,
+       0,
+       0,
+       [](StereoRig& r) { forget_distortion(r.cameras[1].camera); },
+       {},
+       {}},
       baseline("baseline 9 % too short", 0.91, rig),
       baseline("baseline 10 % too long", 1.10, rig),
       baseline("baseline twice as long", 2, rig),

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "fbvins/core/rng.hpp"
 #include "tests/support/setup_fault_lists.hpp"
@@ -20,8 +21,8 @@ SetupFault frozen(std::string name, int nth, bool left, bool right) {
   auto state = std::make_shared<State>();
   return {std::move(name), FindingKind::frozen_images, 0, 0, {}, {}, [=](StereoFrame& frame) {
             if (++state->count % nth == 0) {
-              if (left) frame.left = state->before.left;
-              if (right) frame.right = state->before.right;
+              if (left) frame.set_image(0, state->before.left());
+              if (right) frame.set_image(1, state->before.right());
             }
             state->before = frame;
           }};
@@ -36,8 +37,8 @@ SetupFault right_one_frame_late(double period_s) {
           {},
           {},
           [before](StereoFrame& frame) {
-            if (!*before) *before = frame.right;
-            std::swap(*before, frame.right);
+            if (!*before) *before = frame.right();
+            frame.set_image(1, std::exchange(*before, frame.right()));
           }};
 }
 
@@ -62,18 +63,18 @@ void add_dot(Image& image, double x, double y, double brightness) {
 SetupFault dots(const StereoRig& rig) {
   std::vector<Vec2> places;
   Rng rng(5);
-  for (int y = 8; y < rig.left.height() - 8; y += 18)
-    for (int x = 8; x < rig.left.width() - 8; x += 18) {
+  for (int y = 8; y < rig.left().height() - 8; y += 18)
+    for (int x = 8; x < rig.left().width() - 8; x += 18) {
       const double dx = rng.uniform(), dy = rng.uniform();
       places.emplace_back(x + 8 * dx, y + 8 * dy);
     }
   return {"projector of dots on", FindingKind::projector_dots, 0, 0, {}, {}, [places](StereoFrame& frame) {
-            frame.left = with(frame.left, [&](Image& image) {
-              for (const Vec2& p : places) add_dot(image, p.x(), p.y(), 110);
-            });
-            frame.right = with(frame.right, [&](Image& image) {
-              for (const Vec2& p : places) add_dot(image, p.x() - 9, p.y(), 110);
-            });
+            frame.set_image(0, with(frame.left(), [&](Image& image) {
+                              for (const Vec2& p : places) add_dot(image, p.x(), p.y(), 110);
+                            }));
+            frame.set_image(1, with(frame.right(), [&](Image& image) {
+                              for (const Vec2& p : places) add_dot(image, p.x() - 9, p.y(), 110);
+                            }));
           }};
 }
 
@@ -89,8 +90,8 @@ SetupFault vehicle_in_view() {
                     for (int u = x; u < std::min(x + 12, image.width()); ++u) image.at(u, v) = grey;
                 }
             };
-            frame.left = with(frame.left, paint);
-            frame.right = with(frame.right, paint);
+            frame.set_image(0, with(frame.left(), paint));
+            frame.set_image(1, with(frame.right(), paint));
           }};
 }
 
@@ -132,17 +133,18 @@ void smear(Image& image, const std::vector<Eigen::Matrix<double, 2, 3>>& flow, c
 /// Blur by the rate of the newest reading before an image.
 SetupFault exposed_longer(const StereoRig& rig, double ms) {
   auto rate_B = std::make_shared<Vec3>(Vec3::Zero());
-  return {fmt::format("exposed for {:.0f} ms longer", ms),
-          FindingKind::blur,
-          0,
-          0,
-          {},
-          [rate_B](ImuSample& sample) { *rate_B = sample.gyro_radps; },
-          [=, left = flow_of(rig.left), right = flow_of(rig.right)](StereoFrame& frame) {
-            const Vec3 turn_B = 1e-3 * ms * *rate_B;
-            frame.left = with(frame.left, [&](Image& image) { smear(image, left, rig.T_BC0.R().transpose() * turn_B); });
-            frame.right = with(frame.right, [&](Image& image) { smear(image, right, rig.T_BC1.R().transpose() * turn_B); });
-          }};
+  return {
+      fmt::format("exposed for {:.0f} ms longer", ms),
+      FindingKind::blur,
+      0,
+      0,
+      {},
+      [rate_B](ImuSample& sample) { *rate_B = sample.gyro_radps; },
+      [=, left = flow_of(rig.left()), right = flow_of(rig.right())](StereoFrame& frame) {
+        const Vec3 turn_B = 1e-3 * ms * *rate_B;
+        frame.set_image(0, with(frame.left(), [&](Image& image) { smear(image, left, rig.T_BC0().R().transpose() * turn_B); }));
+        frame.set_image(1, with(frame.right(), [&](Image& image) { smear(image, right, rig.T_BC1().R().transpose() * turn_B); }));
+      }};
 }
 
 SetupFault turned_images() {
@@ -152,8 +154,8 @@ SetupFault turned_images() {
     for (int y = 0; y < image.height(); ++y) std::reverse(image.row(y), image.row(y) + image.width());
   };
   return {"images upside down", FindingKind::images_turned, 0, 0, {}, {}, [half_turn](StereoFrame& frame) {
-            frame.left = with(frame.left, half_turn);
-            frame.right = with(frame.right, half_turn);
+            frame.set_image(0, with(frame.left(), half_turn));
+            frame.set_image(1, with(frame.right(), half_turn));
           }};
 }
 
@@ -162,8 +164,8 @@ SetupFault mirrored_images() {
     for (int y = 0; y < image.height(); ++y) std::reverse(image.row(y), image.row(y) + image.width());
   };
   return {"images mirrored", FindingKind::images_mirrored, 0, 0, {}, {}, [mirror](StereoFrame& frame) {
-            frame.left = with(frame.left, mirror);
-            frame.right = with(frame.right, mirror);
+            frame.set_image(0, with(frame.left(), mirror));
+            frame.set_image(1, with(frame.right(), mirror));
           }};
 }
 
@@ -171,10 +173,10 @@ SetupFault mirrored_images() {
 
 std::vector<SetupFault> of_the_images(const StereoRig& rig) {
   std::vector<SetupFault> all;
-  all.push_back({"left and right exchanged", FindingKind::swapped_images, 0, 0, {}, {}, [](StereoFrame& f) {
-                   std::swap(f.left, f.right);
-                 }});
-  all.push_back({"one camera as both", FindingKind::same_image_twice, 0, 0, {}, {}, [](StereoFrame& f) { f.right = f.left; }});
+  all.push_back(
+      {"left and right exchanged", FindingKind::swapped_images, 0, 0, {}, {}, [](StereoFrame& f) { f.swap_left_right(); }});
+  all.push_back(
+      {"one camera as both", FindingKind::same_image_twice, 0, 0, {}, {}, [](StereoFrame& f) { f.set_image(1, f.left()); }});
   all.push_back(frozen("one right image in ten frozen", 10, false, true));
   all.push_back(frozen("every image twice", 2, true, true));
   all.push_back(right_one_frame_late(1 / rig.image_rate_hz));

@@ -40,11 +40,9 @@ class SimulatedFlight {
   std::function<bool(int, int)> mistaken = [](int, int) { return false; };
 
   SimulatedFlight(const Motion& motion, std::uint64_t seed) : motion_(motion), rng_(seed) {
-    rig.left = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
-    rig.right = rig.left;
+    const Camera camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
     const Mat3 R_BC = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();  // looks along the body's x
-    rig.T_BC0 = {R_BC, Vec3(0.02, 0.055, 0.01)};
-    rig.T_BC1 = {R_BC, Vec3(0.02, -0.055, 0.01)};
+    rig.cameras = {{camera, {R_BC, Vec3(0.02, 0.055, 0.01)}}, {camera, {R_BC, Vec3(0.02, -0.055, 0.01)}}};
     for (int i = 0; i < 1500; ++i) {  // on the walls, floor and ceiling of a room of 8 x 8 x 4 m
       Vec3 p(rng_.uniform(-4, 4), rng_.uniform(-4, 4), rng_.uniform(-2, 2));
       const int axis = static_cast<int>(rng_.below(3));
@@ -65,8 +63,8 @@ class SimulatedFlight {
     out.id = FrameId{k};
     out.t = stamp(k);
     out.offsets = own_offsets(rig);
-    out.has_left = images(k) && left_camera(k);
-    out.has_right = images(k) && right_camera(k);
+    out.set_has(0, images(k) && left_camera(k));
+    out.set_has(1, images(k) && right_camera(k));
     if (k > 0 && readings(k)) {
       out.imu = motion_.segment(stamp(k - 1), out.t, Duration::from_seconds(1 / rig.imu_noise.rate_hz), bias);
       add_noise(out.imu, rig.imu_noise, rng_);
@@ -118,7 +116,7 @@ class SimulatedFlight {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
         const auto track = tracks_.find(i);
         if ((track != tracks_.end()) != followed || static_cast<int>(out.features.size()) >= max_features) continue;
-        const auto left = observe(rig.left, in_camera(k, point(i), 0));
+        const auto left = observe(rig.left(), in_camera(k, point(i), 0));
         if (!left) continue;
         TrackedFeature f;
         const auto known = known_.find(mistaken(k, i) ? i - 1 : i);
@@ -128,7 +126,7 @@ class SimulatedFlight {
         in_use.insert(f.id);
         f.left = *left;
         if (outlier) f.left = shifted(*f.left, outlier(k, f.id.value));
-        if (right_camera(k)) f.right = observe(rig.right, in_camera(k, point(i), 1));
+        if (right_camera(k)) f.right = observe(rig.right(), in_camera(k, point(i), 1));
         if (!left_camera(k)) f.left.reset();
         if (!f.left && !f.right) continue;
         out.stats.tracked += followed;
@@ -154,7 +152,7 @@ class SimulatedFlight {
 
   Observation shifted(Observation o, const Vec2& by_px) const {
     o.pixel += by_px;
-    o.normalised = *rig.left.undistort(o.pixel);
+    o.normalised = *rig.left().undistort(o.pixel);
     return o;
   }
 

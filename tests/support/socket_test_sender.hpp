@@ -25,10 +25,11 @@ inline constexpr std::uint32_t kImageBytes = kWidth * kHeight, kSlotBytes = 2 * 
 /// Numbers that binary fractions hold exactly, with a rotation that is not the identity.
 inline StereoRig socket_test_rig() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002}, kWidth, kHeight);
-  rig.right = Camera(PinholeRadtan{42, 43, 32.5, 22.5, -0.125, 0.03125, 0, 0}, kWidth, kHeight);
-  rig.T_BC0 = {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, 0, 0.125)};
-  rig.T_BC1 = {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, -0.125, 0.125)};
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002}, kWidth, kHeight);
+  rig.cameras[1].camera = Camera(PinholeRadtan{42, 43, 32.5, 22.5, -0.125, 0.03125, 0, 0}, kWidth, kHeight);
+  rig.cameras[0].T_BC = {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, 0, 0.125)};
+  rig.cameras[1].T_BC = {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, -0.125, 0.125)};
   rig.time_offset_s = 0.0078125;
   return rig;
 }

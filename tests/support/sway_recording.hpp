@@ -22,8 +22,8 @@ inline constexpr std::int64_t kMs = 1'000'000;
 inline StereoRig small_rig() {
   StereoRig rig;
   const Camera camera(PinholeRadtan{.fx = kFocal, .fy = kFocal, .cx = 160, .cy = 120}, kWidth, kHeight);
-  rig.left = rig.right = camera;
-  rig.T_BC1.p = Vec3(kBaseline, 0, 0);
+  rig.cameras.assign(2, {camera, {}});
+  rig.cameras[1].T_BC.p = Vec3(kBaseline, 0, 0);
   return rig;
 }
 
@@ -66,7 +66,7 @@ inline std::vector<SensorEvent> sway(int images) {
     const double t_s = 0.005 * k;
     const Time t{5 * kMs * k};
     events.push_back(ImuSample{t, Vec3::Zero(), Vec3(sway_mps2(t_s), -9.81, 0)});
-    if (k % 10 == 0) events.push_back(StereoFrame{t, wall.seen_from(sway_m(t_s)), wall.seen_from(sway_m(t_s) + kBaseline)});
+    if (k % 10 == 0) events.push_back(StereoFrame{t, {wall.seen_from(sway_m(t_s)), wall.seen_from(sway_m(t_s) + kBaseline)}});
   }
   return events;
 }

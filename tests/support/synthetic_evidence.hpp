@@ -20,11 +20,12 @@ struct SyntheticSetup {
 /// EuRoC's kind of rig: 90 degrees wide, 11 cm, the camera's x along the body's -y.
 inline StereoRig synthetic_rig() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{.fx = 458, .fy = 457, .cx = 367, .cy = 248, .k1 = -0.28, .k2 = 0.07}, 752, 480);
-  rig.right = Camera(PinholeRadtan{.fx = 457, .fy = 456, .cx = 379, .cy = 255, .k1 = -0.28, .k2 = 0.07}, 752, 480);
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = Camera(PinholeRadtan{.fx = 458, .fy = 457, .cx = 367, .cy = 248, .k1 = -0.28, .k2 = 0.07}, 752, 480);
+  rig.cameras[1].camera = Camera(PinholeRadtan{.fx = 457, .fy = 456, .cx = 379, .cy = 255, .k1 = -0.28, .k2 = 0.07}, 752, 480);
   const Mat3 R_BC = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished() * so3_exp(Vec3(0.02, -0.01, 0.03)).toRotationMatrix();
-  rig.T_BC0 = {R_BC, Vec3(0.02, 0.055, 0.01)};
-  rig.T_BC1 = {Mat3(R_BC * so3_exp(Vec3(0.01, 0.005, -0.004)).toRotationMatrix()), Vec3(0.02, -0.055, 0.012)};
+  rig.cameras[0].T_BC = {R_BC, Vec3(0.02, 0.055, 0.01)};
+  rig.cameras[1].T_BC = {Mat3(R_BC * so3_exp(Vec3(0.01, 0.005, -0.004)).toRotationMatrix()), Vec3(0.02, -0.055, 0.012)};
   return rig;
 }
 
@@ -76,13 +77,13 @@ class SyntheticEvidence {
     StereoView view{t, {}};
     frame.t = t;
     frame.has_depths = true;
-    const auto T_C0W = rig_.T_BC0.inverse() * motion_.state(t.seconds()).T_FB.inverse();
+    const auto T_C0W = rig_.T_BC0().inverse() * motion_.state(t.seconds()).T_FB.inverse();
     for (std::size_t i = 0; i < points_.size(); ++i) {
-      const auto left = seen(points_[i], rig_.left, rig_.T_BC0, t.seconds());
-      const auto right = seen(points_[i], rig_.right, rig_.T_BC1, t.seconds() + setup_.right_late_s);
+      const auto left = seen(points_[i], rig_.left(), rig_.T_BC0(), t.seconds());
+      const auto right = seen(points_[i], rig_.right(), rig_.T_BC1(), t.seconds() + setup_.right_late_s);
       if (!left || !right) continue;
-      const double disparity = rig_.left.focal_px() * 0.11 / (T_C0W * points_[i]).z();
-      const double inverse_depth = (disparity + 0.2 * rng_.normal()) / (rig_.left.focal_px() * 0.11);
+      const double disparity = rig_.left().focal_px() * 0.11 / (T_C0W * points_[i]).z();
+      const double inverse_depth = (disparity + 0.2 * rng_.normal()) / (rig_.left().focal_px() * 0.11);
       frame.features.push_back({static_cast<std::int64_t>(i), noisy(*left), std::max(inverse_depth, 1e-3), false});
       view.points.push_back({noisy(*left), noisy(*right)});
     }

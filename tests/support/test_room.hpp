@@ -54,12 +54,12 @@ inline const Vocabulary& vocabulary() {
 
 inline StereoRig rig() {
   StereoRig r;
-  r.left = r.right = Camera(PinholeRadtan{kFocal, kFocal, 376, 240}, 752, 480);
+  r.cameras.assign(2, {Camera(PinholeRadtan{kFocal, kFocal, 376, 240}, 752, 480), {}});
   // B: x forward, y left, z up; camera looks along x
   Mat3 R_BC;
   R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  r.T_BC0 = {R_BC, Vec3(0.05, kBaseline / 2, 0)};
-  r.T_BC1 = {R_BC, Vec3(0.05, -kBaseline / 2, 0)};
+  r.cameras[0].T_BC = {R_BC, Vec3(0.05, kBaseline / 2, 0)};
+  r.cameras[1].T_BC = {R_BC, Vec3(0.05, -kBaseline / 2, 0)};
   return r;
 }
 
@@ -67,13 +67,13 @@ inline StereoRig rig() {
 inline StereoRig rig_that_looks_back() {
   StereoRig r = rig();
   const Pose<B, B> turned(Quat(Eigen::AngleAxisd(3.141592653589793, Vec3::UnitZ())), Vec3(0.02, 0, 0.01));
-  r.more = {{r.left, turned * r.T_BC0}, {r.right, turned * r.T_BC1.cast_frames<B, C0>()}};
+  r.cameras.insert(r.cameras.end(), {{r.left(), turned * r.T_BC0()}, {r.right(), turned * r.T_BC1().cast_frames<B, C0>()}});
   return r;
 }
 
 /// Without words.
 inline Place view(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
-  const Pose<G, C0> T_GC = T_GB * rig().T_BC0;
+  const Pose<G, C0> T_GC = T_GB * rig().T_BC0();
   const Pose<C0, G> T_CG = T_GC.inverse();
   Place place;
   place.focal_px = kFocal;

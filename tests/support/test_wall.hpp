@@ -16,8 +16,8 @@ struct TestWall {
 
   StereoRig rig() const {
     StereoRig rig;
-    rig.left = rig.right = camera;
-    rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(kBaseline_m, 0, 0));
+    rig.cameras.assign(2, {camera, {}});
+    rig.cameras[1].T_BC = Pose<B, C0>(Quat::Identity(), Vec3(kBaseline_m, 0, 0));
     return rig;
   }
   static constexpr double kBaseline_m = 0.12;

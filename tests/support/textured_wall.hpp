@@ -19,8 +19,8 @@ inline StereoRig make_rig() {
   model.fx = model.fy = 230;
   model.cx = 187.5, model.cy = 119.5;
   model.k1 = -0.05;
-  rig.left = rig.right = Camera(model, kWidth, kHeight);
-  rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(0.11, 0, 0));
+  rig.cameras.assign(2, {Camera(model, kWidth, kHeight), {}});
+  rig.cameras[1].T_BC = Pose<B, C0>(Quat::Identity(), Vec3(0.11, 0, 0));
   return rig;
 }
 
@@ -31,7 +31,7 @@ class World {
   double angle(int k) const { return 0.2 * kFramePeriod_s * k; }
 
   std::shared_ptr<const Image> render(int k, double offset_x, std::uint64_t noise_seed) const {
-    const Camera& camera = offset_x > 0 ? rig.right : rig.left;
+    const Camera& camera = offset_x > 0 ? rig.right() : rig.left();
     const Eigen::Rotation2Dd R(angle(k));
     const Vec2 centre = position(k).head<2>() + R * Vec2(offset_x, 0);
     const auto warp = [&](const Vec2& px) { return Vec2((centre + R * (*camera.undistort(px) * kDepth_m)) * 230 / kDepth_m); };
@@ -40,8 +40,8 @@ class World {
 
   SensorPacket packet(int k) const {
     SensorPacket p = packet_without_images(k);
-    p.frame.left = render(k, 0, static_cast<std::uint64_t>(2 * k));
-    p.frame.right = render(k, 0.11, static_cast<std::uint64_t>(2 * k + 1));
+    p.frame.set_image(0, render(k, 0, static_cast<std::uint64_t>(2 * k)));
+    p.frame.set_image(1, render(k, 0.11, static_cast<std::uint64_t>(2 * k + 1)));
     return p;
   }
 

@@ -62,7 +62,7 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
   const Calibration& c = w.problem.calibration;
   const auto in_camera = [&](int frame, bool right) {
     const Vec3 p_B = w.problem.frames[frame].state.T_FB.inverse() * p_G;
-    return right ? Vec3(c.T_BC1.inverse() * p_B) : Vec3(c.T_BC0.inverse() * p_B);
+    return right ? Vec3(c.T_BC1().inverse() * p_B) : Vec3(c.T_BC0().inverse() * p_B);
   };
   WindowLandmark l;
   l.host = host;
@@ -109,15 +109,15 @@ inline Window make_window(bool calibrating) {
   Window w;
   Rng rng(17);
   const Motion motion(0.4, 0.2);
-  w.problem.calibration.T_BC0 = {so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)};
+  w.problem.calibration.cameras[0] = {so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)};
   const Pose<C0, C1> T_C0C1(so3_exp(Vec3(0.01, -0.02, 0.005)), Vec3(0.11, 0.001, -0.002));
-  w.problem.calibration.T_BC1 = w.problem.calibration.T_BC0 * T_C0C1;
+  w.problem.calibration.cameras[1] = (w.problem.calibration.T_BC0() * T_C0C1).cast_frames<B, C0>();
   add_frames(w, motion, rng);
   while (static_cast<int>(w.problem.landmarks.size()) < kLandmarks) {
     const int host = static_cast<int>(rng.below(kFrames));
     const double depth = rng.uniform(1.5, 8);
     const Vec3 p_C(rng.uniform(-0.6, 0.6) * depth, rng.uniform(-0.4, 0.4) * depth, depth);
-    add_landmark(w, w.problem.frames[host].state.T_FB * (w.problem.calibration.T_BC0 * p_C), host, rng);
+    add_landmark(w, w.problem.frames[host].state.T_FB * (w.problem.calibration.T_BC0() * p_C), host, rng);
   }
   Rng prior_rng(18);
   for (int k = 0; k < kLandmarks; k += 3) {  // every third has a prior, a few sigmas off

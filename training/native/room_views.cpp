@@ -55,7 +55,7 @@ ViewChange random_view(Rng& rng) {
 }  // namespace
 
 void RoomViews::add(const RenderedFrame& rendered, const Pose<W, B>& T_WB) {
-  frames_.push_back({*rendered.frame.left, rendered.depth_left_m, T_WB * rig_.T_BC0});
+  frames_.push_back({*rendered.frame.left(), rendered.depth_left_m, T_WB * rig_.T_BC0()});
 }
 
 Result<RoomViews> RoomViews::render_changed(int seed) {
@@ -94,12 +94,12 @@ std::optional<Vec2> RoomViews::transfer(std::size_t from, std::size_t to, const 
   constexpr double kSameSurface = 0.03;  // of the depth; a point farther off is occluded
   const Frame &a = frames_[from], &b = frames_[to];
   const float z = depth_at(a, px);
-  const std::optional<Vec2> ray = rig_.left.undistort(px);
+  const std::optional<Vec2> ray = rig_.left().undistort(px);
   if (!(z > 0) || !ray) return std::nullopt;
   const Vec3 p_C = b.T_WC.inverse() * (a.T_WC * Vec3(z * ray->homogeneous()));
   if (p_C.z() < 0.1) return std::nullopt;
-  const std::optional<Vec2> there = rig_.left.project(p_C);
-  if (!there || !rig_.left.inside(*there, 2)) return std::nullopt;
+  const std::optional<Vec2> there = rig_.left().project(p_C);
+  if (!there || !rig_.left().inside(*there, 2)) return std::nullopt;
   if (std::abs(depth_at(b, *there) - p_C.z()) > kSameSurface * p_C.z() + 0.01) return std::nullopt;
   return there;
 }
@@ -107,8 +107,8 @@ std::optional<Vec2> RoomViews::transfer(std::size_t from, std::size_t to, const 
 double RoomViews::overlap(std::size_t from, std::size_t to) const {
   constexpr int kStep = 32;
   int seen = 0, all = 0;
-  for (int y = kStep / 2; y < rig_.left.height(); y += kStep)
-    for (int x = kStep / 2; x < rig_.left.width(); x += kStep, ++all) seen += transfer(from, to, Vec2(x, y)) ? 1 : 0;
+  for (int y = kStep / 2; y < rig_.left().height(); y += kStep)
+    for (int x = kStep / 2; x < rig_.left().width(); x += kStep, ++all) seen += transfer(from, to, Vec2(x, y)) ? 1 : 0;
   return static_cast<double>(seen) / all;
 }
 

@@ -20,6 +20,7 @@
 #include "fbvins/camera/lens_models.hpp"
 #include "fbvins/camera/mask.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/by_camera.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -131,37 +132,35 @@ struct DepthSensor {
   std::optional<MountedCamera> own = {};  ///< in whose pixels and along whose z it measures; without it the left camera's
 };
 
-/// A depth is observed like a disparity: in a right camera so far away that what it sees of the pixel itself counts nothing.
-inline constexpr double kDepthBaseline_m = 10;
-
-/// Cameras and an IMU, rigidly joined. The cameras are numbered: 0 is `left`, 1 is `right`, those from 2 on are `more`. Which of
-/// them see the same things follows from geometry (camera_groups). With one camera `right` has no pixels, and there are no more.
-/// With one camera and a depth sensor C1 is the frame of the camera in which depths are observed, kDepthBaseline_m to the right.
+/// Cameras and an IMU, rigidly joined. The cameras are numbered from 0 on; the first two are called left and right. Which of them
+/// see the same things follows from geometry (camera_groups).
 struct StereoRig {
-  Camera left, right;
-  Pose<B, C0> T_BC0;
-  Pose<B, C1> T_BC1;
-  std::vector<MountedCamera> more;
-  std::optional<DepthSensor> depth;
+  std::vector<MountedCamera> cameras;  ///< empty: the rig is not set
+  std::optional<DepthSensor> depth;    ///< beside one camera
   ImuNoise imu_noise;
   double image_rate_hz = 20;
   /// Those of camera 0, and of all others that have none of their own (CameraTimes, times()).
   double time_offset_s = 0, line_delay_s = 0;
 
-  bool has_right() const { return right.width() > 0; }
-  int camera_count() const { return (has_right() ? 2 : 1) + static_cast<int>(more.size()); }
-  const Camera& camera(int i) const { return i == 0 ? left : i == 1 ? right : more[static_cast<std::size_t>(i - 2)].camera; }
-  Pose<B, C0> T_BC(int i) const {
-    return i == 0 ? T_BC0 : i == 1 ? T_BC1.cast_frames<B, C0>() : more[static_cast<std::size_t>(i - 2)].T_BC;
-  }
+  int camera_count() const { return static_cast<int>(cameras.size()); }
+  bool has_right() const { return cameras.size() > 1; }
+  /// One that the rig does not have has no pixels.
+  const MountedCamera& mounted(int i) const { return of_camera(cameras, i); }
+  const Camera& camera(int i) const { return mounted(i).camera; }
+  const Pose<B, C0>& T_BC(int i) const { return mounted(i).T_BC; }
   CameraTimes times(int i) const {
     const CameraTimes& own = camera(i).own_times();
     return {time_offset_s + own.time_offset_s, line_delay_s + own.line_delay_s};
   }
-  MountedCamera mounted(int i) const { return {camera(i), T_BC(i)}; }
   /// Whose pixels those of the depth images are.
-  const Camera& depth_camera() const { return depth && depth->own ? depth->own->camera : left; }
-  Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
+  const Camera& depth_camera() const { return depth && depth->own ? depth->own->camera : left(); }
+
+  const Camera& left() const { return camera(0); }
+  const Camera& right() const { return camera(1); }
+  const Pose<B, C0>& T_BC0() const { return T_BC(0); }
+  /// That of the left camera where there is no right one.
+  Pose<B, C1> T_BC1() const { return T_BC(has_right() ? 1 : 0).cast_frames<B, C1>(); }
+  Pose<C1, C0> T_C1C0() const { return T_BC1().inverse() * T_BC0(); }
 };
 
 /// The rig with these cameras, one at least, in place of its own. A depth sensor stays where there is one camera. What the first
@@ -174,15 +173,8 @@ inline StereoRig with_cameras(StereoRig rig, std::vector<MountedCamera> cameras)
       mounted.camera.set_own_times({own.time_offset_s - first.time_offset_s, own.line_delay_s - first.line_delay_s});
     }
   }
-  const MountedCamera &first = cameras.front(), &second = cameras.size() > 1 ? cameras[1] : MountedCamera{{}, first.T_BC};
-  rig.left = first.camera;
-  rig.T_BC0 = first.T_BC;
-  rig.right = second.camera;
-  rig.T_BC1 = second.T_BC.cast_frames<B, C1>();
-  rig.more.clear();
-  for (std::size_t i = 2; i < cameras.size(); ++i) rig.more.push_back(cameras[i]);
-  if (cameras.size() > 1) rig.depth.reset();
-  if (rig.depth) rig.T_BC1.p = rig.T_BC0 * Vec3(kDepthBaseline_m, 0, 0);
+  rig.cameras = std::move(cameras);
+  if (rig.has_right()) rig.depth.reset();
   return rig;
 }
 

@@ -19,6 +19,12 @@ struct MeasuredInverseDepth {
   Vec2 slope_1pm_px = Vec2::Zero();  ///< its derivative by the pixel
 };
 
+/// A depth is observed like a disparity: in a right camera so far away that what it sees of the pixel itself counts nothing.
+inline constexpr double kDepthBaseline_m = 10;
+
+/// Where that camera is, which is beside the left one.
+inline Pose<B, C0> depth_observer(const Pose<B, C0>& T_BC0) { return {T_BC0.q, T_BC0 * Vec3(kDepthBaseline_m, 0, 0)}; }
+
 class DepthReader {
  public:
   /// Of a rig with a depth sensor.

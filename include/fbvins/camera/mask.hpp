@@ -3,7 +3,7 @@
 //
 //   Image seen(752, 480, 255);
 //   hide(seen, MaskCircle{376, 470, 60});
-//   rig.left.set_mask(std::make_shared<const Mask>(seen));
+//   rig.cameras[0].camera.set_mask(std::make_shared<const Mask>(seen));
 #pragma once
 
 #include <cstdint>

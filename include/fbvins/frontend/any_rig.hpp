@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From a frontend for one camera, or for a pair whose left camera never fails, to one for any rig.
 //
-//   class MyFrontend : public Frontend { ... };   // follows features in rig.left, and finds them again in rig.right
+//   class MyFrontend : public Frontend { ... };   // follows features in rig.left(), and finds them again in rig.right()
 //   const auto make = [](const StereoRig& pair) { return std::make_unique<MyFrontend>(pair); };
 //   std::unique_ptr<Frontend> frontend = for_any_rig(rig, 150, make);
 #pragma once

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Observations of features for the estimator, with their weights. Pure functions.
 //
-//   feature.left = observe(rig.left, px, 0.5);   // found to half a pixel; nothing where the lens has no ray
+//   feature.left = observe(rig.left(), px, 0.5);   // found to half a pixel; nothing where the lens has no ray
 #pragma once
 
 #include <optional>

@@ -63,29 +63,26 @@ struct DatasetOptions {
 /// One stereo frame as listed, before its images are read.
 struct FrameEntry {
   Time t;
-  std::string left_file, right_file;           ///< names known to the loader; empty: no image; all empty: recorded without any
+  /// Of each camera, as the loader names it; empty, or missing at the end: no image. All empty: recorded without any.
+  std::vector<std::string> files = {};
   std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; none: stamps decide
-  std::vector<std::string> more_files = {};    ///< of the cameras from number 2 on
   std::string depth_file = {};                 ///< of the depth sensor
   ExposureOffsets offsets = {};                ///< of cameras without a common trigger
 
-  /// Of camera i.
-  std::string file(int camera) const {
-    if (camera < 2) return camera == 0 ? left_file : right_file;
-    const auto at = static_cast<std::size_t>(camera - 2);
-    return at < more_files.size() ? more_files[at] : std::string();
-  }
-  bool without_images() const {
-    return left_file.empty() && right_file.empty() && std::ranges::all_of(more_files, &std::string::empty);
-  }
+  std::string& file(int camera) { return of_camera(files, camera); }
+  const std::string& file(int camera) const { return of_camera(files, camera); }
+  bool without_images() const { return std::ranges::all_of(files, &std::string::empty); }
 };
 
 /// One stereo frame as read.
 struct LoadedFrame {
   StereoFrame frame;
-  ImageCounts left, right, more, depth;  ///< what happened, 0 or 1 for each image
-  std::string problem;                   ///< "file: sentence" about the first image that failed
-  std::optional<ImageSize> other_size;   ///< of the last image that is not of its camera's
+  std::vector<ImageCounts> cameras;     ///< what happened, 0 or 1 for each image
+  ImageCounts depth;                    ///< the same of the depth image
+  std::string problem;                  ///< "file: sentence" about the first image that failed
+  std::optional<ImageSize> other_size;  ///< of the last image that is not of its camera's
+
+  ImageCounts& of(int camera) { return of_camera(cameras, camera); }
 };
 
 /// Where a Dataset gets its images from. Called by one thread at a time, not always the same.

@@ -7,6 +7,7 @@
 
 #include "fbvins/core/time.hpp"
 #include "fbvins/io/row_counts.hpp"
+#include "fbvins/types/by_camera.hpp"
 
 namespace fbvins {
 
@@ -28,6 +29,10 @@ struct ImageCounts {
   int wrong_size = 0;  ///< not the size of the calibration (known once delivered)
 
   int bad() const { return missing + corrupt + wrong_size; }
+  ImageCounts& operator+=(const ImageCounts& other) {
+    missing += other.missing, corrupt += other.corrupt, wrong_size += other.wrong_size;
+    return *this;
+  }
 };
 
 struct CameraInfo {
@@ -35,6 +40,11 @@ struct CameraInfo {
   int listed = 0;      ///< good rows
   int unpaired = 0;    ///< images without a partner in the other camera
   ImageCounts images;  ///< among the frames that skip_frames and max_frames leave
+
+  CameraInfo& operator+=(const CameraInfo& other) {
+    rows += other.rows, listed += other.listed, unpaired += other.unpaired, images += other.images;
+    return *this;
+  }
 };
 
 /// Readings of the sensors of one kind that aid images and IMU.
@@ -47,8 +57,7 @@ struct AidingCount {
 struct DatasetInfo {
   std::string name;    ///< last part of the path
   std::string format;  ///< "EuRoC folder", "EuRoC zip" or "MCAP flight record"
-  CameraInfo left, right;
-  CameraInfo more;   ///< of the cameras from number 2 on together
+  std::vector<CameraInfo> cameras;
   CameraInfo depth;  ///< of the depth sensor
   RowCounts imu_rows, ground_truth_rows;
   int frames = 0;  ///< frames that next() will deliver, less those found without any image
@@ -63,6 +72,15 @@ struct DatasetInfo {
   std::vector<Time> clock_steps;  ///< where the estimate begins anew, as the clock stepped back there; continued stamps
   std::vector<std::string> warnings;
   std::vector<ScaledLens> scaled;  ///< by camera
+
+  CameraInfo& camera(int i) { return of_camera(cameras, i); }
+  const CameraInfo& camera(int i) const { return of_camera(cameras, i); }
+  /// Of the cameras from number 2 on together.
+  CameraInfo further() const {
+    CameraInfo sum;
+    for (std::size_t i = 2; i < cameras.size(); ++i) sum += cameras[i];
+    return sum;
+  }
 };
 
 }  // namespace fbvins

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fbvins/core/time.hpp"
+#include "fbvins/types/by_camera.hpp"
 
 namespace fbvins {
 
@@ -75,15 +76,8 @@ class ExposureOffsets {
  public:
   ExposureOffsets() = default;
   explicit ExposureOffsets(std::vector<Duration> of_cameras) : of_cameras_(std::move(of_cameras)) {}
-  Duration of(int camera) const {
-    const auto at = static_cast<std::size_t>(camera);
-    return at < of_cameras_.size() ? of_cameras_[at] : Duration{};
-  }
-  void set(int camera, Duration offset) {
-    const auto at = static_cast<std::size_t>(camera);
-    if (at >= of_cameras_.size()) of_cameras_.resize(at + 1);
-    of_cameras_[at] = offset;
-  }
+  Duration of(int camera) const { return of_camera(of_cameras_, camera); }
+  void set(int camera, Duration offset) { of_camera(of_cameras_, camera) = offset; }
   bool all_zero() const { return longest().ns == 0; }
   /// Of all cameras, without its sign.
   Duration longest() const {
@@ -110,24 +104,25 @@ class ExposureOffsets {
   std::vector<Duration> of_cameras_;
 };
 
-/// Images of the rig's cameras 0 (left), 1 (right) and from 2 on (more), taken at the same instant unless `offsets` says
-/// otherwise. A camera that delivered nothing has a null pointer, or is missing at the end of `more`.
+/// Images of the rig's cameras, by number, taken at the same instant unless `offsets` says otherwise. A camera that delivered
+/// nothing has a null pointer, or is missing at the end.
 struct StereoFrame {
   Time t;
-  std::shared_ptr<const Image> left;
-  std::shared_ptr<const Image> right;
-  std::vector<std::shared_ptr<const Image>> more = {};
+  std::vector<std::shared_ptr<const Image>> images = {};
   std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
   ExposureOffsets offsets = {};
   bool after_clock_step = false;  ///< the first one since the clock stepped back: nobody knows how much time has passed
 
-  std::shared_ptr<const Image> image(int camera) const {
-    if (camera < 2) return camera == 0 ? left : right;
-    const auto at = static_cast<std::size_t>(camera - 2);
-    return at < more.size() ? more[at] : nullptr;
+  const std::shared_ptr<const Image>& image(int camera) const { return of_camera(images, camera); }
+  const std::shared_ptr<const Image>& left() const { return image(0); }
+  const std::shared_ptr<const Image>& right() const { return image(1); }
+  void set_image(int camera, std::shared_ptr<const Image> image) { of_camera(images, camera) = std::move(image); }
+  void swap_left_right() {
+    images.resize(std::max<std::size_t>(2, images.size()));
+    std::swap(images[0], images[1]);
   }
   bool without_images() const {
-    return !left && !right && std::ranges::all_of(more, [](const auto& image) { return image == nullptr; });
+    return std::ranges::all_of(images, [](const auto& image) { return image == nullptr; });
   }
 };
 

@@ -19,9 +19,7 @@ inline std::shared_ptr<const Image> owned(const std::shared_ptr<const Image>& im
 }
 
 inline StereoFrame owned(StereoFrame frame) {
-  frame.left = owned(frame.left);
-  frame.right = owned(frame.right);
-  for (auto& image : frame.more) image = owned(image);
+  for (auto& image : frame.images) image = owned(image);
   return frame;
 }
 

@@ -92,9 +92,8 @@ struct TrackedFrame {
   FrameId id;
   Time t;
   std::vector<TrackedFeature> features;
-  bool has_left = false, has_right = false;  ///< a usable image of camera 0, of camera 1 came
-  std::vector<bool> has_more = {};           ///< and of the cameras from 2 on
-  ImuSegment imu;                            ///< since the frame before
+  std::vector<bool> cameras = {};  ///< of which a usable image came; one that is missing at the end has none
+  ImuSegment imu;                  ///< since the frame before
   FrontendStats stats;
   StereoFrame images;                            ///< null unless keyframes are wanted, which carry the images
   std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
@@ -102,6 +101,17 @@ struct TrackedFrame {
   std::vector<Anchor> anchors = {};              ///< for the map
   std::vector<AidingSample> aiding = {};         ///< since the image before; filled by the system
   bool after_clock_step = false;                 ///< as in StereoFrame; filled by the system
+
+  /// Whether a usable image of the camera came.
+  bool has(int camera) const {
+    const auto at = static_cast<std::size_t>(camera);
+    return at < cameras.size() && cameras[at];
+  }
+  void set_has(int camera, bool came) {
+    const auto at = static_cast<std::size_t>(camera);
+    if (at >= cameras.size()) cameras.resize(at + 1);
+    cameras[at] = came;
+  }
 };
 
 /// A landmark with its last estimated position.

@@ -96,20 +96,17 @@ Result<StereoRig> board_flight_rig(const BoardFlightOptions& options) {
   for (const Camera& left : example_cameras()) {
     if (left.model_name() != options.lens) continue;
     const SimulatedRig cameras = simulated_stereo(left);
-    StereoRig rig;
-    rig.left = cameras.cameras[0];
-    rig.right = cameras.cameras[1];
     Mat3 R_BC;
     R_BC << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-    rig.T_BC0 = {Quat(R_BC) * so3_exp(Vec3(0.02, -0.03, 0.015)), Vec3(-0.0216, -0.0647, 0.0098)};
-    std::vector<MountedCamera> mounted{{left, rig.T_BC0}};
+    const Pose<B, C0> T_BC0{Quat(R_BC) * so3_exp(Vec3(0.02, -0.03, 0.015)), Vec3(-0.0216, -0.0647, 0.0098)};
+    std::vector<MountedCamera> mounted{{left, T_BC0}};
     for (int k = 1; k < options.cameras; ++k) {
       const SimulatedRig one = k == 1 ? cameras : further_camera(left, k);
-      mounted.push_back({one.cameras[1], rig.T_BC0 * one.T_CnC0[1].inverse().cast_frames<C0, C0>()});
+      mounted.push_back({one.cameras[1], T_BC0 * one.T_CnC0[1].inverse().cast_frames<C0, C0>()});
     }
     for (std::size_t k = 1; k < mounted.size(); ++k)
       mounted[k].camera.set_own_times({1e-3 * options.later_ms * static_cast<double>(k), 0});
-    rig = with_cameras(std::move(rig), mounted);
+    StereoRig rig = with_cameras({}, mounted);
     rig.image_rate_hz = options.image_rate_hz;
     rig.time_offset_s = 1e-3 * options.time_offset_ms, rig.line_delay_s = 1e-6 * options.line_delay_us;
     return rig;
@@ -127,7 +124,7 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
   Result<EurocFolder> recording = create_simulated_recording(folder, *rig);
   if (!recording) return recording.error();
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  const SplineTrajectory hand = hand_before_board(options.board, rig->left.focal_px() / rig->left.width(), rig->T_BC0,
+  const SplineTrajectory hand = hand_before_board(options.board, rig->left().focal_px() / rig->left().width(), rig->T_BC0(),
                                                   options.seconds + 1, seed, options.motion);
   const Pose<W, T> T_WT = hanging_board(options.board);
   std::vector<BoardCamera> cameras;
@@ -153,11 +150,8 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
     std::vector<std::future<std::shared_ptr<const Image>>> others;
     for (int k = 1; k < rig->camera_count(); ++k) others.push_back(std::async(std::launch::async, take, k));
     const Time stamp{kStart_ns + std::llround(1e9 * (middle_s - rig->time_offset_s))};
-    StereoFrame frame{stamp, take(0), nullptr};
-    for (std::size_t k = 0; k < others.size(); ++k) {
-      if (k == 0) frame.right = others[k].get();
-      else frame.more.push_back(others[k].get());
-    }
+    StereoFrame frame{stamp, {take(0)}};
+    for (auto& other : others) frame.images.push_back(other.get());
     if (Result<void> done = recording->add(std::move(frame), stamp); !done) return done;
     if (progress) progress(i + 1, count);
   }

@@ -39,7 +39,7 @@ TEST(BoardFlight, ARenderedBoardGivesTheLensesThatTookIt) {
   EXPECT_LT(calibrated->noise_px, 0.06);
   const StereoRig rig = *board_flight_rig(options);
   const std::vector<double> got = lens_parameters(calibrated->cameras[0].camera.model()),
-                            want = lens_parameters(rig.left.model());
+                            want = lens_parameters(rig.left().model());
   for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(got[k], want[k], 0.5) << k;
   const Pose<Cn, C0> T_C1C0 = rig.T_C1C0().cast_frames<Cn, C0>();
   EXPECT_LT((calibrated->cameras[1].T_CnC0.p - T_C1C0.p).norm(), 2e-4);

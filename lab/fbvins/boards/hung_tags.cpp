@@ -51,7 +51,7 @@ bool sees(const World& world, const Pose<W, C0>& T_WC, const Place& place, doubl
 std::vector<Place> possible_places(const World& world, const Simulation& s, double size_m) {
   std::vector<Pose<W, C0>> cameras;
   for (double t = 0; t < s.flight.duration_s(); t += kSample_s) {
-    const Pose<W, C0> T = s.flight.pose(t) * s.rig.T_BC0;
+    const Pose<W, C0> T = s.flight.pose(t) * s.rig.T_BC0();
     cameras.push_back({T.q, Vec3(T.p + s.world_from_flight)});
   }
   std::vector<Place> out;

@@ -75,12 +75,13 @@ void ImageFaultInjector::see(const StereoFrame& frame) {
 
 template <class Change>
 void ImageFaultInjector::each_image(StereoFrame& frame, Change&& change) const {
-  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i)
+  for (int i = 0; i < static_cast<int>(frame.images.size()); ++i)
     if (camera_ == kAllCameras || camera_ == i) change(*image_in(frame, i), i);
 }
 
 void ImageFaultInjector::alter(StereoFrame& frame) {
   const bool first = count_ == 0;
+  frame.images.resize(std::max<std::size_t>(2, frame.images.size()));  // a missing image may be replaced, too
   const StereoFrame& previous = before_.size() > 1 ? before_[before_.size() - 2] : before_.back();
   if (first) held_ = previous;
   ++count_;
@@ -100,8 +101,8 @@ void ImageFaultInjector::alter(StereoFrame& frame) {
       if (count_ % 2 == 0) become(previous);
       return;
     case ImageFault::late: return become(previous);
-    case ImageFault::exchanged: std::swap(frame.left, frame.right); return;
-    case ImageFault::same_twice: frame.right = frame.left; return;
+    case ImageFault::exchanged: frame.swap_left_right(); return;
+    case ImageFault::same_twice: frame.set_image(1, frame.left()); return;
     default: break;
   }
   each_image(frame, [&](Shared& image, int camera) {

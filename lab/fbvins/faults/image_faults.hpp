@@ -43,9 +43,8 @@ inline constexpr int kAllCameras = -1;
 
 /// The image of a camera in the frame; null where it has no place for one.
 inline std::shared_ptr<const Image>* image_in(StereoFrame& frame, int camera) {
-  if (camera < 2) return camera == 0 ? &frame.left : &frame.right;
-  const auto further = static_cast<std::size_t>(camera - 2);
-  return further < frame.more.size() ? &frame.more[further] : nullptr;
+  const auto at = static_cast<std::size_t>(camera);
+  return at < frame.images.size() ? &frame.images[at] : nullptr;
 }
 
 /// A value; the same calls give the same bits.

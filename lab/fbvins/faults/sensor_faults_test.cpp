@@ -39,7 +39,7 @@ Notes fly(const std::vector<std::string>& texts) {
     faulty.push(ImuSample{ms(t), Vec3::Zero(), Vec3::Zero()});
     if (t % 100 != 0) continue;
     const auto value = static_cast<std::uint8_t>(t / 100);
-    faulty.push(StereoFrame{ms(t), std::make_shared<Image>(2, 2, value), std::make_shared<Image>(2, 2, value)});
+    faulty.push(StereoFrame{ms(t), {std::make_shared<Image>(2, 2, value), std::make_shared<Image>(2, 2, value)}});
   }
   return notes;
 }
@@ -63,8 +63,8 @@ TEST(SensorFaults, OneCameraIsOffOrFrozen) {
     const auto* frame = std::get_if<StereoFrame>(&event);
     if (frame == nullptr) continue;
     const bool off = when >= 1000 && when < 1500, frozen = when >= 2000 && when < 2500;
-    EXPECT_EQ(frame->left == nullptr, off) << when;
-    EXPECT_EQ(frame->right->at(0, 0), frozen ? 19 : when / 100) << when;
+    EXPECT_EQ(frame->left() == nullptr, off) << when;
+    EXPECT_EQ(frame->right()->at(0, 0), frozen ? 19 : when / 100) << when;
   }
 }
 
@@ -74,7 +74,7 @@ std::vector<StereoFrame> fly_four(const std::string& text) {
   FaultyInput faulty(notes, {*parse_fault(text)});
   for (int k = 0; k < 20; ++k) {
     const auto image = [&](int camera) { return std::make_shared<Image>(2, 2, static_cast<std::uint8_t>(10 * k + camera)); };
-    faulty.push(StereoFrame{ms(100 * k), image(0), image(1), {image(2), image(3)}});
+    faulty.push(StereoFrame{ms(100 * k), {image(0), image(1), image(2), image(3)}});
   }
   std::vector<StereoFrame> out;
   for (const auto& [when, event] : notes.events) out.push_back(std::get<StereoFrame>(event));
@@ -164,7 +164,7 @@ Notes fly_fault(const std::optional<std::string>& text) {
         image.at(x, y) = static_cast<std::uint8_t>(40 + (7 * x + 13 * y * y + t / 10) % 160);
         right.at(x, y) = static_cast<std::uint8_t>(50 + (7 * x + 13 * y * y + t / 10) % 160);
       }
-    faulty.push(StereoFrame{ms(t), std::make_shared<Image>(image), std::make_shared<Image>(right)});
+    faulty.push(StereoFrame{ms(t), {std::make_shared<Image>(image), std::make_shared<Image>(right)}});
   }
   return notes;
 }
@@ -179,7 +179,7 @@ bool same(const SensorEvent& a, const SensorEvent& b) {
   const auto equal = [](const std::shared_ptr<const Image>& p, const std::shared_ptr<const Image>& q) {
     return p == q || (p && q && std::equal(p->row(0), p->row(0) + 64 * 48, q->row(0)));
   };
-  return x.t == y.t && equal(x.left, y.left) && equal(x.right, y.right);
+  return x.t == y.t && equal(x.left(), y.left()) && equal(x.right(), y.right());
 }
 
 TEST(SensorFaults, EachAltersItsTimeAndNothingElse) {

@@ -38,8 +38,7 @@ double hover_radps(const QuadrotorOptions& o) {
 /// Through rotation matrices, as calibration files have them: they change the last bits of a quaternion. With the same bits a
 /// replay of the recording gives the same bytes.
 StereoRig as_recorded(StereoRig rig) {
-  rig.T_BC0 = Pose<B, C0>(rig.T_BC0.R(), rig.T_BC0.p);
-  rig.T_BC1 = Pose<B, C1>(rig.T_BC1.R(), rig.T_BC1.p);
+  for (MountedCamera& mounted : rig.cameras) mounted.T_BC = Pose<B, C0>(mounted.T_BC.R(), mounted.T_BC.p);
   return rig;
 }
 

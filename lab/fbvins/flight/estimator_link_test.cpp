@@ -14,7 +14,7 @@ Time at_ms(std::int64_t ms) { return Time{ms * 1'000'000}; }
 
 StereoFrame black_frame(std::int64_t ms) {
   const auto image = std::make_shared<const Image>(752, 480);
-  return {at_ms(ms), image, image};
+  return {at_ms(ms), {image, image}};
 }
 
 /// Stamps [ms] of the images whose estimates became available at each reading, in half a second of black images at rest.

@@ -23,7 +23,7 @@ Result<std::vector<KnownEstimate>> rest(OdometryLink& link) {
       Image image(752, 480);
       image.at(0, 0) = static_cast<std::uint8_t>(ms / 50);
       const auto shared = std::make_shared<const Image>(std::move(image));
-      if (Result<void> pushed = link.push(StereoFrame{at_ms(ms - 3), shared, shared}); !pushed) return pushed.error();
+      if (Result<void> pushed = link.push(StereoFrame{at_ms(ms - 3), {shared, shared}}); !pushed) return pushed.error();
     }
     Result<std::vector<KnownEstimate>> known = link.known_at(at_ms(ms));
     if (!known) return known.error();

@@ -44,7 +44,7 @@ Result<std::unique_ptr<SocketSender>> SocketSender::connect(const std::string& p
   if (path.size() >= sizeof(address.sun_path)) return Error{ErrorCode::unreadable, path + ": too long for a socket's name"};
   path.copy(address.sun_path, path.size());
   if (::connect(connection.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) return failed(path);
-  std::unique_ptr<SocketSender> sender(new SocketSender(std::move(connection), rig.left.width(), rig.left.height()));
+  std::unique_ptr<SocketSender> sender(new SocketSender(std::move(connection), rig.left().width(), rig.left().height()));
   if (Result<void> greeted = sender->greet(rig); !greeted) return greeted.error();
   return sender;
 }
@@ -145,7 +145,8 @@ Result<void> SocketSender::send(const StereoFrame& frame) {
   message.slot = static_cast<std::uint32_t>(std::countr_zero(free_slots_));
   const std::size_t image_bytes = std::size_t{width_px_} * height_px_;
   std::uint8_t* at = slots_ + message.slot * 2 * image_bytes;
-  for (const auto& [image, flag] : {std::pair{frame.left.get(), FBVINS_SOCKET_LEFT}, {frame.right.get(), FBVINS_SOCKET_RIGHT}}) {
+  for (const auto& [image, flag] :
+       {std::pair{frame.left().get(), FBVINS_SOCKET_LEFT}, {frame.right().get(), FBVINS_SOCKET_RIGHT}}) {
     if (image != nullptr) {
       for (int y = 0; y < image->height(); ++y)
         std::copy_n(image->row(y), image->width(), at + static_cast<std::size_t>(y) * width_px_);

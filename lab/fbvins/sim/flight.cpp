@@ -163,7 +163,7 @@ Quat body_in_vehicle(const StereoRig& rig, double camera_pitch_deg) {
   Mat3 R_VC0;  // columns: the camera's right, down and forward in V
   R_VC0 << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Quat pitch = so3_exp(Vec3(0, camera_pitch_deg * std::numbers::pi / 180, 0));
-  return (pitch * Quat(R_VC0) * rig.T_BC0.q.conjugate()).normalized();
+  return (pitch * Quat(R_VC0) * rig.T_BC0().q.conjugate()).normalized();
 }
 
 Quat vehicle_attitude(const Vec3& a_WB, double yaw_rad) {

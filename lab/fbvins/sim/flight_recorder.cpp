@@ -140,7 +140,7 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
   for (std::size_t i = 1; i < eyes_.size(); ++i)
     others.push_back(
         std::async(std::launch::async, [this, i, t_s, frame] { return render_eye(eyes_[i], exposed_s(i, t_s), frame); }));
-  rendered.frame.left = std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame));
+  rendered.frame.set_image(0, std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame)));
   if (with_depth) eyes_.front().faces.front().renderer.depth(rendered.depth_left_m);
   if (depth_) {
     std::vector<float> exact_m;
@@ -151,11 +151,7 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
   }
   for (std::size_t i = 1; i < eyes_.size(); ++i)
     if (const Duration d = offset(i, t_s); d.ns != 0) rendered.frame.offsets.set(static_cast<int>(i), d);
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    auto image = std::make_shared<const Image>(others[i].get());
-    if (i == 0) rendered.frame.right = std::move(image);
-    else rendered.frame.more.push_back(std::move(image));
-  }
+  for (auto& other : others) rendered.frame.images.push_back(std::make_shared<const Image>(other.get()));
   return rendered;
 }
 

@@ -65,7 +65,7 @@ TEST(Flight, ThrustPointsAlongTheSpecificForce) {
 
 TEST(Flight, CameraLooksForwardAndDown) {
   const StereoRig rig = euroc_rig();
-  const Vec3 forward = body_in_vehicle(rig, 20) * (rig.T_BC0.q * Vec3::UnitZ());
+  const Vec3 forward = body_in_vehicle(rig, 20) * (rig.T_BC0().q * Vec3::UnitZ());
   EXPECT_LT((forward - Vec3(std::cos(20 * 3.14159265 / 180), 0, -std::sin(20 * 3.14159265 / 180))).norm(), 1e-6);
 }
 

@@ -28,7 +28,7 @@ Statistics of(const Image& image) {
 }
 
 TEST(ImageSensor, NoiseGrowsWithLightAndGainAsItsOptionsSay) {
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   for (float level : {30.0f, 120.0f}) {
     CameraModelOptions options = plain();
     options.auto_exposure = false;
@@ -44,7 +44,7 @@ TEST(ImageSensor, NoiseGrowsWithLightAndGainAsItsOptionsSay) {
 
 TEST(ImageSensor, ExposureSettlesAndFollowsWithLag) {
   CameraModelOptions options = plain();
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   ImageSensor sensor(options, camera, 1.0, 3);
   const std::vector<float> bright(752 * 480, 1.0f), dim(752 * 480, 0.25f);
   sensor.settle(bright);
@@ -66,7 +66,7 @@ TEST(ImageSensor, ExposureSettlesAndFollowsWithLag) {
 
 TEST(ImageSensor, DarknessEndsAtTheLargestExposureAndGain) {
   CameraModelOptions options = plain();
-  ImageSensor sensor(options, euroc_rig().left, 1.0, 3);
+  ImageSensor sensor(options, euroc_rig().left(), 1.0, 3);
   sensor.settle(std::vector<float>(752 * 480, 1e-4f));
   EXPECT_NEAR(sensor.exposure_s(), options.max_exposure_ms * 1e-3, 1e-9);
   EXPECT_NEAR(sensor.gain(), options.max_gain, 1e-9);
@@ -78,7 +78,7 @@ TEST(ImageSensor, BlurAndGlareKeepTheLight) {
   options.read_noise = options.shot_noise = 0;
   options.blur_px = 1;
   options.glare = 0.2;
-  ImageSensor sensor(options, euroc_rig().left, 1.0, 3);
+  ImageSensor sensor(options, euroc_rig().left(), 1.0, 3);
   std::vector<float> light(752 * 480, 0.0f);
   for (int y = 200; y < 280; ++y)
     for (int x = 300; x < 400; ++x) light[static_cast<std::size_t>(y) * 752 + x] = 0.5f;
@@ -103,7 +103,7 @@ TEST(ImageSensor, AnImageOfASingleBlockHasGlareToo) {
 }
 
 TEST(ImageSensor, TheSameFrameHasTheSameNoiseAnotherHasOther) {
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   const auto image = [&](std::int64_t frame) {
     ImageSensor sensor(plain(), camera, 1.0, 3);
     std::vector<float> light(752 * 480, 0.3f);

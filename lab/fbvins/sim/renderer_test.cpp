@@ -63,7 +63,7 @@ double edge_column(const std::vector<float>& image, int width, int y) {
 
 TEST(Renderer, EdgesAreWhereTheDistortedCameraSeesThem) {
   const World world = split_wall();
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   Instant instant;
   instant.q_WC = looking_along_x();
   instant.p_WC = Vec3(0, 0.4, 0.1);
@@ -87,7 +87,7 @@ TEST(Renderer, EdgesAreWhereTheDistortedCameraSeesThem) {
 
 TEST(Renderer, TexturesAreNotMirrored) {
   const World world = split_wall();
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   Instant instant;
   instant.q_WC = looking_along_x();
   const std::vector<float> image = rendered(world, camera, instant);
@@ -97,7 +97,7 @@ TEST(Renderer, TexturesAreNotMirrored) {
 
 TEST(Renderer, DepthIsExact) {
   const World world = split_wall();
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   Instant instant;
   instant.q_WC = (looking_along_x() * so3_exp(Vec3(0, 0.2, 0))).normalized();
   std::vector<float> depth;
@@ -120,14 +120,14 @@ TEST(Renderer, NearerThingsHideFartherOnes) {
   Instant instant;
   instant.q_WC = looking_along_x();
   std::vector<float> depth;
-  rendered(world, euroc_rig().left, instant, &depth);
+  rendered(world, euroc_rig().left(), instant, &depth);
   EXPECT_NEAR(depth[248 * 752 + 367], 1.5, 1e-3);
   EXPECT_GT(depth[20 * 752 + 367], 2.9);
 }
 
 TEST(Renderer, LinesReadLaterShowALaterMoment) {
   const World world = split_wall();
-  const Camera camera = euroc_rig().left;
+  const Camera camera = euroc_rig().left();
   Instant still, turning;
   still.q_WC = turning.q_WC = looking_along_x();
   turning.w_WC_C = Vec3(0, 1.0, 0);  // to the right: the scene moves left
@@ -144,7 +144,7 @@ TEST(Renderer, LinesReadLaterShowALaterMoment) {
 TEST(FlightRecorder, ARollingShutterBeginsHalfAnImageBeforeTheStamp) {
   for (const int height : {48, 480}) {
     StereoRig rig;
-    rig.left = rig.right = Camera(PinholeRadtan{40, 40, 32, 0.5 * height, 0, 0, 0, 0}, 64, height);
+    rig.cameras.assign(2, {Camera(PinholeRadtan{40, 40, 32, 0.5 * height, 0, 0, 0, 0}, 64, height), {}});
     SimulationOptions options;
     options.camera.line_delay_us = 30;
     options.camera.time_samples = 1;

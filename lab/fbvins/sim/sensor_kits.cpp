@@ -180,10 +180,9 @@ StereoRig kit_rig(const std::string& name) {
   Mat3 R_BC;
   for (int i = 0; i < 3; ++i) R_BC.col(i) = axis(kit->right_down_forward[static_cast<std::size_t>(i)]);
   const Vec3 place = Eigen::Map<const Vec3>(kit->place_m.data());
-  rig.left = Camera(kit->lens, kit->width, kit->height);
-  rig.T_BC0 = {R_BC, place};
-  rig.right = kit->baseline_m > 0 ? rig.left : Camera();
-  rig.T_BC1 = {R_BC, Vec3(place + R_BC * Vec3(kit->baseline_m, 0, 0))};
+  const Camera camera(kit->lens, kit->width, kit->height);
+  rig.cameras = {{camera, {R_BC, place}}};
+  if (kit->baseline_m > 0) rig.cameras.push_back({camera, {R_BC, Vec3(place + R_BC * Vec3(kit->baseline_m, 0, 0))}});
   rig.imu_noise = noise_of(*kit);
   return rig;
 }

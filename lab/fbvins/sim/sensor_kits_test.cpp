@@ -29,7 +29,7 @@ TEST(SensorKits, EachIsARigThatCanBeFlownWith) {
     ASSERT_TRUE(rig) << name;
     EXPECT_TRUE(check_rig(*rig, name));
     EXPECT_TRUE(check_rig(calibrated_rig(options, *rig), name));
-    EXPECT_NEAR(rig->T_BC0.R().determinant(), 1, 1e-12) << name;
+    EXPECT_NEAR(rig->T_BC0().R().determinant(), 1, 1e-12) << name;
     EXPECT_EQ(rig->has_right(), name == "d435i" || name == "oak-d" || name == "adis16448") << name;
   }
   SimulationOptions options;
@@ -44,9 +44,9 @@ TEST(SensorKits, TheCalibrationOfAUserDoesNotKnowOffsetAndLineDelay) {
   EXPECT_NEAR(rig.line_delay_s, 0.028 / 360, 1e-12);
   EXPECT_EQ(calibrated.time_offset_s, 0);
   EXPECT_EQ(calibrated.line_delay_s, 0);
-  EXPECT_NE(rig.left.distortion()[0], 0);
-  EXPECT_EQ(calibrated.left.distortion()[0], 0);
-  const double turned = so3_log((rig.T_BC0.q.conjugate() * calibrated.T_BC0.q).normalized()).norm();
+  EXPECT_NE(rig.left().distortion()[0], 0);
+  EXPECT_EQ(calibrated.left().distortion()[0], 0);
+  const double turned = so3_log((rig.T_BC0().q.conjugate() * calibrated.T_BC0().q).normalized()).norm();
   EXPECT_GT(turned, 1e-4);
   EXPECT_LT(turned, 0.05);
 }
@@ -57,8 +57,8 @@ TEST(SensorKits, WithoutErrorsTheCalibrationIsTheRig) {
   const StereoRig rig = *simulated_rig(options), calibrated = calibrated_rig(options, rig);
   EXPECT_EQ(calibrated.time_offset_s, rig.time_offset_s);
   EXPECT_EQ(calibrated.line_delay_s, rig.line_delay_s);
-  EXPECT_EQ(calibrated.left.intrinsics(), rig.left.intrinsics());
-  EXPECT_EQ(calibrated.T_BC0.p, rig.T_BC0.p);
+  EXPECT_EQ(calibrated.left().intrinsics(), rig.left().intrinsics());
+  EXPECT_EQ(calibrated.T_BC0().p, rig.T_BC0().p);
 }
 
 TEST(SensorKits, IntervalsChangeWithTheExposure) {
@@ -113,7 +113,7 @@ TEST(SensorKits, ARollingShutterFollowsMotionThatChanges) {
     auto simulation = prepare_simulation(options);
     EXPECT_TRUE(simulation);
     simulation->frames = {simulation->start + Duration::from_seconds(t_s)};
-    const auto image = render_frame(*simulation, 0).frame.left;
+    const auto image = render_frame(*simulation, 0).frame.left();
     return std::vector<int>(image->row(row), image->row(row) + image->width());
   };
   const auto difference = [](const std::vector<int>& a, const std::vector<int>& b) {

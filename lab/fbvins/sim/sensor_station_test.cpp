@@ -55,8 +55,8 @@ TEST(SensorStation, AgreesWithARecordingOfTheSameFlight) {
     const RenderedFrame a = asked->render([&](double t) { return flight.at(t); }), b = render_frame(*recording, i);
     EXPECT_EQ(a.frame.t, b.frame.t);
     EXPECT_EQ(a.right_stamp, b.right_stamp);
-    EXPECT_TRUE(std::equal(a.frame.left->row(0), a.frame.left->row(480), b.frame.left->row(0)));
-    EXPECT_TRUE(std::equal(a.frame.right->row(0), a.frame.right->row(480), b.frame.right->row(0)));
+    EXPECT_TRUE(std::equal(a.frame.left()->row(0), a.frame.left()->row(480), b.frame.left()->row(0)));
+    EXPECT_TRUE(std::equal(a.frame.right()->row(0), a.frame.right()->row(480), b.frame.right()->row(0)));
   }
 }
 

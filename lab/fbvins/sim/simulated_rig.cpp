@@ -20,7 +20,7 @@ namespace {
 void add_turned(StereoRig& rig, double degrees, std::initializer_list<int> cameras) {
   std::vector<MountedCamera> all;
   for (int i = 0; i < rig.camera_count(); ++i) all.push_back(rig.mounted(i));
-  const Vec3 axis = -(rig.T_BC0.q * Vec3::UnitY()), through = rig.T_BC0 * Vec3(0, 0, -0.05);
+  const Vec3 axis = -(rig.T_BC0().q * Vec3::UnitY()), through = rig.T_BC0() * Vec3(0, 0, -0.05);
   const Quat turn(Eigen::AngleAxisd(degrees * kDegree, axis));
   const Pose<B, B> turned(turn, Vec3(through - turn * through));
   for (const int i : cameras) all.push_back({rig.camera(i), turned * rig.T_BC(i)});
@@ -47,15 +47,13 @@ MountedCamera depth_camera(const Pose<B, C0>& T_BC0, double apart_m) {
 }
 
 void put_lens(StereoRig& rig, const Camera& camera) {
-  rig.left = camera;
-  if (rig.has_right()) rig.right = camera;
+  for (int i = 0; i < std::min(2, rig.camera_count()); ++i) rig.cameras[static_cast<std::size_t>(i)].camera = camera;
 }
 
 /// The kit with its IMU turned, so that the cameras look in the body as those of `rig`.
 StereoRig in_axes_of(const StereoRig& rig, StereoRig kit) {
-  const Pose<B, B> turn(Quat(rig.T_BC0.q * kit.T_BC0.q.conjugate()), Vec3::Zero());
-  kit.T_BC0 = turn * kit.T_BC0;
-  kit.T_BC1 = turn * kit.T_BC1;
+  const Pose<B, B> turn(Quat(rig.T_BC0().q * kit.T_BC0().q.conjugate()), Vec3::Zero());
+  for (MountedCamera& mounted : kit.cameras) mounted.T_BC = turn * mounted.T_BC;
   return kit;
 }
 
@@ -104,12 +102,10 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
   if (o.rig == "rgbd") {
     rig = with_depth(rig,
                      {.noise_at_1m_m = o.depth.noise_at_1m_m, .nearest_m = o.depth.nearest_m, .farthest_m = o.depth.farthest_m});
-    if (o.depth.apart_m > 0) rig.depth->own = depth_camera(rig.T_BC0, o.depth.apart_m);
+    if (o.depth.apart_m > 0) rig.depth->own = depth_camera(rig.T_BC0(), o.depth.apart_m);
   }
-  for (int i = 1; o.camera.later_ms > 0 && i < rig.camera_count(); ++i) {
-    Camera& camera = i == 1 ? rig.right : rig.more[static_cast<std::size_t>(i - 2)].camera;
-    camera.set_own_times({.time_offset_s = 1e-3 * i * o.camera.later_ms});
-  }
+  for (int i = 1; o.camera.later_ms > 0 && i < rig.camera_count(); ++i)
+    rig.cameras[static_cast<std::size_t>(i)].camera.set_own_times({.time_offset_s = 1e-3 * i * o.camera.later_ms});
   rig.image_rate_hz = o.image_rate_hz;
   rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
   rig.line_delay_s = o.camera.line_delay_us * 1e-6;
@@ -121,16 +117,15 @@ StereoRig calibrated_rig(const SimulationOptions& o, StereoRig rig) {
   if (error == CalibrationErrorOptions{} && o.sensors == "none") return rig;
   Rng rng(static_cast<std::uint64_t>(o.seed), 64);
   const Vec3 of_left = lens_error(error, rng);
-  rig.left = miscalibrated(rig.left, error, of_left);
+  rig.cameras[0].camera = miscalibrated(rig.left(), error, of_left);
   if (rig.has_right()) {
     const Vec3 own = lens_error(error, rng);
-    rig.right = miscalibrated(rig.right, error, error.pair_share < 1 ? Vec3(of_left + error.pair_share * own) : own);
+    rig.cameras[1].camera =
+        miscalibrated(rig.right(), error, error.pair_share < 1 ? Vec3(of_left + error.pair_share * own) : own);
   }
   const Pose<B, B> moved(so3_exp(normal3(rng, error.mounting_deg * kDegree)), normal3(rng, 1e-3 * error.place_mm));
   if (error.mounting_deg > 0 || error.place_mm > 0) {
-    rig.T_BC0 = moved * rig.T_BC0;
-    rig.T_BC1 = moved * rig.T_BC1;
-    for (MountedCamera& camera : rig.more) camera.T_BC = moved * camera.T_BC;
+    for (MountedCamera& camera : rig.cameras) camera.T_BC = moved * camera.T_BC;
     if (rig.depth && rig.depth->own) rig.depth->own->T_BC = moved * rig.depth->own->T_BC;
   }
   if (error.without_line_delay) rig.line_delay_s = 0;

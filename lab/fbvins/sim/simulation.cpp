@@ -161,13 +161,13 @@ DatasetContents contents_of(Simulation simulation, const std::string& name) {
   for (std::size_t i = 0; i < simulation.frames.size(); ++i)
     stamps.push_back(simulation.frames[i] - offset + simulation.recorder->stamp_error(static_cast<std::int64_t>(i)));
   for (Time t : stamps)
-    contents.frames.push_back({t, "left", rig.has_right() ? "right" : "", std::nullopt,
-                               std::vector<std::string>(rig.more.size(), "more"), rig.depth ? "depth" : ""});
+    contents.frames.push_back(
+        {.t = t, .files = std::vector<std::string>(rig.cameras.size(), "rendered"), .depth_file = rig.depth ? "depth" : ""});
   DatasetInfo& info = contents.info;
   info.name = name;
   info.format = "simulation";
-  info.frames = info.left.listed = static_cast<int>(contents.frames.size());
-  if (rig.has_right()) info.right.listed = info.frames;
+  info.frames = static_cast<int>(contents.frames.size());
+  for (int i = 0; i < std::min(2, rig.camera_count()); ++i) info.camera(i).listed = info.frames;
   if (rig.depth) info.depth.listed = info.frames;
   info.imu_samples = static_cast<int>(contents.imu.size());
   info.ground_truth_poses = static_cast<int>(contents.ground_truth.size());

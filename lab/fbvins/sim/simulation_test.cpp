@@ -49,7 +49,7 @@ TEST(Simulation, SameSeedSameBitsOtherSeedOtherWorld) {
     options.seed = seed;
     auto simulation = prepare_simulation(options);
     EXPECT_TRUE(simulation);
-    return *render_frame(*simulation, 0).frame.left;
+    return *render_frame(*simulation, 0).frame.left();
   };
   const Image a = first_image(1), b = first_image(1), c = first_image(2);
   EXPECT_TRUE(std::equal(a.row(0), a.row(480), b.row(0)));
@@ -73,8 +73,8 @@ TEST(Simulation, ADatasetDeliversItInOrderWithTruth) {
     } else {
       const auto& frame = std::get<StereoFrame>(*event);
       EXPECT_LE(frame.t, last);
-      EXPECT_NEAR(mean(*frame.left), 130, 25);
-      EXPECT_NEAR(mean(*frame.right), 130, 25);
+      EXPECT_NEAR(mean(*frame.left()), 130, 25);
+      EXPECT_NEAR(mean(*frame.right()), 130, 25);
       ++frames;
     }
   }
@@ -88,7 +88,7 @@ TEST(Simulation, ScenariosHaveTheirEffects) {
   auto dim = prepare_simulation(short_flight("dim"));
   ASSERT_TRUE(dim);
   const RenderedFrame rendered = render_frame(*dim, 0);
-  EXPECT_LT(mean(*rendered.frame.left), 75);
+  EXPECT_LT(mean(*rendered.frame.left()), 75);
   // Switching: brightness jumps within the flight although exposure follows.
   SimulationOptions options = short_flight("switching");
   options.flight.duration_s = 9;
@@ -96,7 +96,7 @@ TEST(Simulation, ScenariosHaveTheirEffects) {
   ASSERT_TRUE(lamps);
   double low = 255, high = 0;
   for (std::size_t i = 0; i < lamps->frames.size(); ++i) {
-    const double m = mean(*render_frame(*lamps, i).frame.left);
+    const double m = mean(*render_frame(*lamps, i).frame.left());
     low = std::min(low, m);
     high = std::max(high, m);
   }
@@ -123,8 +123,8 @@ TEST(Simulation, CamerasMayTakeTheirImagesLaterThanTheirStampsSay) {
   const StereoFrame on_time = frame(0), later = frame(8);
   EXPECT_EQ(later.t, on_time.t);
   EXPECT_TRUE(later.offsets.all_zero()) << "offsets are of stamps";
-  EXPECT_TRUE(std::equal(later.left->row(0), later.left->row(480), on_time.left->row(0)));
-  EXPECT_FALSE(std::equal(later.right->row(0), later.right->row(480), on_time.right->row(0)));
+  EXPECT_TRUE(std::equal(later.left()->row(0), later.left()->row(480), on_time.left()->row(0)));
+  EXPECT_FALSE(std::equal(later.right()->row(0), later.right()->row(480), on_time.right()->row(0)));
 }
 
 TEST(Simulation, OneCameraSeesWhatTheLeftOneOfAPairSees) {
@@ -136,8 +136,8 @@ TEST(Simulation, OneCameraSeesWhatTheLeftOneOfAPairSees) {
     return render_frame(*simulation, 4).frame;
   };
   const StereoFrame one = frame("mono"), pair = frame("stereo");
-  EXPECT_EQ(one.right, nullptr);
-  EXPECT_TRUE(std::equal(one.left->row(0), one.left->row(480), pair.left->row(0)));
+  EXPECT_EQ(one.right(), nullptr);
+  EXPECT_TRUE(std::equal(one.left()->row(0), one.left()->row(480), pair.left()->row(0)));
 }
 
 TEST(Simulation, ADepthSensorThatLiesElsewhereMeasuresTheSameRoom) {
@@ -185,8 +185,8 @@ TEST(Simulation, TheEurocFolderReadsBackToTheSameBits) {
 
   auto data = open_dataset(folder);
   ASSERT_TRUE(data) << data.error().message;
-  EXPECT_NEAR((*data)->rig().left.focal_px(), simulation->rig.left.focal_px(), 1e-9);
-  EXPECT_LT(((*data)->rig().T_BC1.p - simulation->rig.T_BC1.p).norm(), 1e-12);
+  EXPECT_NEAR((*data)->rig().left().focal_px(), simulation->rig.left().focal_px(), 1e-9);
+  EXPECT_LT(((*data)->rig().T_BC1().p - simulation->rig.T_BC1().p).norm(), 1e-12);
   auto again = prepare_simulation(options);
   std::size_t samples = 0, frames = 0;
   while (auto event = (*data)->next()) {
@@ -196,9 +196,9 @@ TEST(Simulation, TheEurocFolderReadsBackToTheSameBits) {
     } else {
       const auto& frame = std::get<StereoFrame>(*event);
       const RenderedFrame rendered = render_frame(*again, frames++);
-      ASSERT_TRUE(frame.left && frame.right);
-      EXPECT_TRUE(std::equal(frame.left->row(0), frame.left->row(480), rendered.frame.left->row(0)));
-      EXPECT_TRUE(std::equal(frame.right->row(0), frame.right->row(480), rendered.frame.right->row(0)));
+      ASSERT_TRUE(frame.left() && frame.right());
+      EXPECT_TRUE(std::equal(frame.left()->row(0), frame.left()->row(480), rendered.frame.left()->row(0)));
+      EXPECT_TRUE(std::equal(frame.right()->row(0), frame.right()->row(480), rendered.frame.right()->row(0)));
     }
   }
   EXPECT_EQ(frames, 3u);

@@ -44,11 +44,11 @@ Result<StillRoom> StillRoom::build(const SimulationOptions& options, double ever
 }
 
 std::optional<Pose<W, B>> StillRoom::seen_from(const Pose<W, B>& view, const ViewChange& change) const {
-  const Vec3 eye = view * rig_.T_BC0.p, axis = view.q * (rig_.T_BC0.q * Vec3::UnitZ());
+  const Vec3 eye = view * rig_.T_BC0().p, axis = view.q * (rig_.T_BC0().q * Vec3::UnitZ());
   const Vec3 about = eye + kAhead_m * Vec3(axis.x(), axis.y(), 0).normalized();
   const Quat turn = so3_exp(Vec3(0, 0, change.turned_deg * kDegree));
   const Pose<W, B> moved((turn * view.q).normalized(), Vec3(turn * (view.p - about) + about + Vec3(0, 0, change.higher_m)));
-  if (!has_room_for_camera(*world_, moved * rig_.T_BC0.p)) return std::nullopt;
+  if (!has_room_for_camera(*world_, moved * rig_.T_BC0().p)) return std::nullopt;
   return moved;
 }
 

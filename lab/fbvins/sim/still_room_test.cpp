@@ -26,7 +26,7 @@ TEST(StillRoom, TheSameChangeGivesTheSameImageAndAnotherAnother) {
   const auto room = StillRoom::build(short_flight(), 2);
   ASSERT_TRUE(room) << room.error().message;
   const std::vector<Pose<W, B>> view = {room->views()[1]};
-  const auto left = [&](const RoomChange& change) { return room->render(view, change)[0].frame.left; };
+  const auto left = [&](const RoomChange& change) { return room->render(view, change)[0].frame.left(); };
   const auto before = left({});
   EXPECT_EQ(difference(*before, *left({})), 0);
   EXPECT_GT(difference(*before, *left({.lamps = LampChange::sun})), 5);
@@ -40,7 +40,7 @@ TEST(StillRoom, ATurnedViewLooksAtTheSamePoint) {
   int turned = 0;
   for (const Pose<W, B>& view : room->views())
     if (const auto other = room->seen_from(view, {.turned_deg = 40})) {
-      const Pose<W, C0> a = view * rig.T_BC0, b = *other * rig.T_BC0;
+      const Pose<W, C0> a = view * rig.T_BC0(), b = *other * rig.T_BC0();
       const Vec3 axis_a = a.q * Vec3::UnitZ(), axis_b = b.q * Vec3::UnitZ();
       const Vec3 ahead = a.p + 2.5 * Vec3(axis_a.x(), axis_a.y(), 0).normalized();
       EXPECT_NEAR((b.p + 2.5 * Vec3(axis_b.x(), axis_b.y(), 0).normalized() - ahead).norm(), 0, 1e-6);

@@ -68,8 +68,8 @@ TEST(BagAiding, UnknownTopicsAreAnsweredWithThoseThereAre) {
 
 TEST(BagAiding, OurOwnBagsKeepIt) {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{90, 91, 40, 30, 0, 0, 0, 0}, 80, 60);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{90, 91, 40, 30, 0, 0, 0, 0}, 80, 60), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   rig.time_offset_s = 0.02;
   const std::filesystem::path file =
       std::filesystem::path(::testing::TempDir()) / ("aiding_" + std::to_string(getpid()) + ".bag");
@@ -86,7 +86,7 @@ TEST(BagAiding, OurOwnBagsKeepIt) {
     ASSERT_TRUE(bag->add(AidingSample(RangeSample{.t = t, .distance_m = 1.5, .p_B = Vec3(0.1, 0, 0)})));
     ASSERT_TRUE(bag->add(AidingSample(wheel)));
     ASSERT_TRUE(bag->add(AidingSample(PressureSample{t, 1e5, 2})));
-    ASSERT_TRUE(bag->add(StereoFrame{t, image, image}));
+    ASSERT_TRUE(bag->add(StereoFrame{t, {image, image}}));
   }
   ASSERT_TRUE(bag->finish());
   auto data = open_recording(file.string());

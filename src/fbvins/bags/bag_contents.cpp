@@ -301,7 +301,7 @@ std::optional<MountedCamera> depth_camera_of(const BagContents& contents, const 
   const BagCamera *camera = camera_for(contents, topics.cameras.front()), *depth = camera_for(contents, topics.depth);
   const auto between = camera && depth ? find_transform(contents.transforms, camera->frame, depth->frame) : std::nullopt;
   if (!between) return std::nullopt;
-  return MountedCamera{depth->camera, rig.T_BC0 * between->cast_frames<C0, C0>()};
+  return MountedCamera{depth->camera, rig.T_BC0() * between->cast_frames<C0, C0>()};
 }
 
 }  // namespace fbvins

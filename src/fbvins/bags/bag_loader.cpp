@@ -55,15 +55,13 @@ LoadedFrame BagLoader::load(const FrameEntry& entry) {
   LoadedFrame out;
   out.frame.t = entry.t;
   out.frame.offsets = entry.offsets;
-  out.frame.more.resize(entry.more_files.size());
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const auto read = [&](const Sensor& s, std::string_view bytes) {
       Result<Image> image = image_of(bytes, s.encoding, s.compressed, used_bits_);
       return image && s.part != Sensor::whole ? Result<Image>(half_of(*image, s.part == Sensor::right_half ? 1 : 0)) : image;
     };
-    ImageCounts& counts = i == 0 ? out.left : i == 1 ? out.right : out.more;
-    if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, counts, out))
-      (i == 0 ? out.frame.left : i == 1 ? out.frame.right : out.frame.more[i - 2]) = std::move(image);
+    if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, out.of(static_cast<int>(i)), out))
+      out.frame.set_image(static_cast<int>(i), std::move(image));
   }
   if (!depth_) return out;
   const auto read = [](const Sensor& s, std::string_view bytes) { return depth_of(bytes, s.encoding, s.compressed); };

@@ -30,10 +30,11 @@ class Bags : public ::testing::Test {
 
   static StereoRig rig() {
     StereoRig rig;
-    rig.left = Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60);
-    rig.right = Camera(PinholeRadtan{92, 93, 41, 31, 0.1, 0.2, 0.01, 0.02}, 80, 60);
-    rig.T_BC0 = {so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03}};
-    rig.T_BC1 = {so3_exp({0.12, -0.19, 1.49}), {0.01, 0.09, 0.03}};
+    rig.cameras.resize(2);
+    rig.cameras[0].camera = Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60);
+    rig.cameras[1].camera = Camera(PinholeRadtan{92, 93, 41, 31, 0.1, 0.2, 0.01, 0.02}, 80, 60);
+    rig.cameras[0].T_BC = {so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03}};
+    rig.cameras[1].T_BC = {so3_exp({0.12, -0.19, 1.49}), {0.01, 0.09, 0.03}};
     return rig;
   }
   static std::shared_ptr<const Image> image(int number) {
@@ -50,7 +51,7 @@ class Bags : public ::testing::Test {
       const Time t{1'000'000'000 + 5'000'000 * static_cast<std::int64_t>(i)};
       ASSERT_TRUE(bag->add(ImuSample{t, Vec3(0.1 * i, 0, 1e-9), Vec3(0, 9.81, i)}));
       if (i % 10 != 5) continue;
-      ASSERT_TRUE(bag->add(StereoFrame{t, image(i), image(i + 1)}));
+      ASSERT_TRUE(bag->add(StereoFrame{t, {image(i), image(i + 1)}}));
     }
     ASSERT_TRUE(bag->finish());
   }
@@ -69,8 +70,8 @@ TEST_F(Bags, WhatIsWrittenIsRead) {
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ((*data)->info().frames, 20);
   EXPECT_EQ((*data)->info().imu_samples, 200);
-  EXPECT_LT(((*data)->rig().T_BC1.R() - rig().T_BC1.R()).norm(), 1e-12);
-  EXPECT_EQ(std::get<PinholeRadtan>((*data)->rig().right.model()).p2, 0.02);
+  EXPECT_LT(((*data)->rig().T_BC1().R() - rig().T_BC1().R()).norm(), 1e-12);
+  EXPECT_EQ(std::get<PinholeRadtan>((*data)->rig().right().model()).p2, 0.02);
   int readings = 0, frames = 0;
   while (auto event = (*data)->next()) {
     if (const auto* sample = std::get_if<ImuSample>(&*event)) {
@@ -79,8 +80,8 @@ TEST_F(Bags, WhatIsWrittenIsRead) {
       continue;
     }
     const auto& frame = std::get<StereoFrame>(*event);
-    EXPECT_EQ(frame.left->at(7, 11), image(5 + 10 * frames)->at(7, 11));
-    EXPECT_EQ(frame.right->at(79, 59), image(6 + 10 * frames++)->at(79, 59));
+    EXPECT_EQ(frame.left()->at(7, 11), image(5 + 10 * frames)->at(7, 11));
+    EXPECT_EQ(frame.right()->at(79, 59), image(6 + 10 * frames++)->at(79, 59));
   }
   EXPECT_EQ(readings, 200);
   EXPECT_EQ(frames, 20);
@@ -98,7 +99,7 @@ TEST_F(Bags, NoiseTimeOffsetAndTruthAreKept) {
     const Time t{1'000'000'000 + 5'000'000 * static_cast<std::int64_t>(i)};
     ASSERT_TRUE(bag->add(ImuSample{t, Vec3::Zero(), Vec3(0, 0, 9.81)}));
     if (i % 10 != 0) continue;
-    ASSERT_TRUE(bag->add(StereoFrame{t, image(i), image(i)}));
+    ASSERT_TRUE(bag->add(StereoFrame{t, {image(i), image(i)}}));
     ASSERT_TRUE(bag->add_truth(t, {so3_exp({0.1, 0.2, 0.01 * i}), {1, 2, 0.1 * i}}));
   }
   ASSERT_TRUE(bag->finish());
@@ -109,7 +110,7 @@ TEST_F(Bags, NoiseTimeOffsetAndTruthAreKept) {
   EXPECT_EQ(read.imu_noise.rate_hz, 201);
   EXPECT_EQ(read.imu_noise.max_accel_mps2, 80);
   EXPECT_EQ(read.time_offset_s, 0.0125);
-  EXPECT_EQ(read.T_BC0.q.coeffs(), given.T_BC0.q.coeffs());
+  EXPECT_EQ(read.T_BC0().q.coeffs(), given.T_BC0().q.coeffs());
   EXPECT_TRUE((*data)->info().warnings.empty()) << (*data)->info().warnings.front();
   ASSERT_EQ((*data)->ground_truth().size(), 5u);
   EXPECT_LT(((*data)->ground_truth()[3].T_WB.p - Vec3(1, 2, 3)).norm(), 1e-12);
@@ -117,7 +118,7 @@ TEST_F(Bags, NoiseTimeOffsetAndTruthAreKept) {
   const auto swapped = open_recording(path("whole.bag"), {.topics = {"/cam1/image_raw", "/cam0/image_raw"}});
   ASSERT_TRUE(swapped) << swapped.error().message;
   EXPECT_EQ((*swapped)->rig().time_offset_s, 0);
-  EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
+  EXPECT_EQ((*swapped)->rig().left().focal_px(), 92.5);
 }
 
 /// What comes before the cut is there, whatever the place, and more of it the later the cut.
@@ -169,7 +170,7 @@ TEST_F(Bags, TopicsThatCannotBeFoundAreListed) {
                 "/cam1/image_raw, readings on /imu0");
   const auto swapped = open_recording(path("flight.bag"), {.topics = {"/cam1/image_raw", "/cam0/image_raw"}});
   ASSERT_TRUE(swapped) << swapped.error().message;
-  EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
+  EXPECT_EQ((*swapped)->rig().left().focal_px(), 92.5);
 }
 
 /// Messages one after the other, in ROS 1's encoding.
@@ -236,9 +237,9 @@ TEST(BagContents, StreamsOfLibrealsenseAreKnownByTheirTopics) {
   EXPECT_EQ(topics->accel, accel + "/imu/data");
   const auto rig = rig_of(contents, *topics);
   ASSERT_TRUE(rig) << rig.error().message;
-  EXPECT_EQ(rig->left.intrinsics(), (std::array{425.0, 426.0, 424.0, 240.0}));
+  EXPECT_EQ(rig->left().intrinsics(), (std::array{425.0, 426.0, 424.0, 240.0}));
   const Vec3 p_C0(1, 2, 3);
-  EXPECT_LT((rig->T_BC0 * p_C0 - (turned * p_C0 + Vec3(-0.0055, 0.0051, 0.0117))).norm(), 1e-12);
+  EXPECT_LT((rig->T_BC0() * p_C0 - (turned * p_C0 + Vec3(-0.0055, 0.0051, 0.0117))).norm(), 1e-12);
   EXPECT_LT((rig->T_C1C0() * p_C0 - Vec3(0.95, 2, 3)).norm(), 1e-12);
 }
 

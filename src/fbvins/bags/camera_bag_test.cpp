@@ -17,8 +17,8 @@ namespace fs = std::filesystem;
 
 StereoRig small_rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60);
-  rig.T_BC1.p.y() = 0.1;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60), {}});
+  rig.cameras[1].T_BC.p.y() = 0.1;
   rig.imu_noise.gyro_noise_density_radps_rthz = 3e-4;
   return rig;
 }
@@ -30,7 +30,7 @@ void fill(auto& file) {
     ASSERT_TRUE(file.add(ImuSample{t, Vec3(0.1 * i, 0, 0), Vec3(0, 9.81, i)}));
     const auto shade = [&](int more) { return std::make_shared<const Image>(80, 60, static_cast<std::uint8_t>(i + more)); };
     if (i % 10 != 5) continue;
-    ASSERT_TRUE(file.add(StereoFrame{t, shade(0), shade(100)}));
+    ASSERT_TRUE(file.add(StereoFrame{t, {shade(0), shade(100)}}));
   }
   ASSERT_TRUE(file.finish());
 }

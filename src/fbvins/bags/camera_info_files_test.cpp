@@ -23,9 +23,9 @@ class CameraInfoFiles : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::create_directories(folder_);
-    rig_.left = rig_.right = Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60);
-    rig_.T_BC0 = {so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03}};
-    rig_.T_BC1 = rig_.T_BC0.cast_frames<B, C0>() * Pose<C0, C1>(Quat::Identity(), Vec3(0.1, 0, 0));
+    rig_.cameras.assign(2, {Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60), {}});
+    rig_.cameras[0].T_BC = {so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03}};
+    rig_.cameras[1].T_BC = rig_.T_BC0() * Pose<C0, C0>(Quat::Identity(), Vec3(0.1, 0, 0));
     auto bag = Ros1BagWriter::create(bag_path(), rig_, Time{1'000'000'000});
     ASSERT_TRUE(bag) << bag.error().message;
     const auto image = std::make_shared<const Image>(80, 60, std::uint8_t{90});
@@ -33,7 +33,7 @@ class CameraInfoFiles : public ::testing::Test {
       const Time t{1'000'000'000 + 5'000'000 * i};
       ASSERT_TRUE(bag->add(ImuSample{t, Vec3(1e-6 * static_cast<double>(i), 0, 0), Vec3(0, 0, 9.81)}));
       if (i % 10 == 5) {
-        ASSERT_TRUE(bag->add(StereoFrame{t, image, image}));
+        ASSERT_TRUE(bag->add(StereoFrame{t, {image, image}}));
       }
     }
     ASSERT_TRUE(bag->finish());
@@ -59,9 +59,9 @@ TEST_F(CameraInfoFiles, HaveTheLensesAndTheBagThePlaces) {
   const auto data = open_recording(bag_path(), {.calibration = both});
   ASSERT_TRUE(data) << data.error().message;
   const StereoRig& rig = (*data)->rig();
-  EXPECT_EQ(rig.left.intrinsics()[0], 88);
-  EXPECT_EQ(rig.right.intrinsics()[0], 87);
-  EXPECT_LT((rig.T_BC0.p - rig_.T_BC0.p).norm() + (rig.T_BC1.p - rig_.T_BC1.p).norm(), 1e-9);
+  EXPECT_EQ(rig.left().intrinsics()[0], 88);
+  EXPECT_EQ(rig.right().intrinsics()[0], 87);
+  EXPECT_LT((rig.T_BC0().p - rig_.T_BC0().p).norm() + (rig.T_BC1().p - rig_.T_BC1().p).norm(), 1e-9);
 }
 
 TEST_F(CameraInfoFiles, AreAsManyAsCameras) {
@@ -71,7 +71,7 @@ TEST_F(CameraInfoFiles, AreAsManyAsCameras) {
   EXPECT_NE(data.error().message.find("1 camera_info files for 2 cameras"), std::string::npos) << data.error().message;
   const auto left = open_recording(bag_path(), {.calibration = one, .topics = {bag_camera_topic(0)}});
   ASSERT_TRUE(left) << left.error().message;
-  EXPECT_EQ((*left)->rig().left.intrinsics()[0], 88);
+  EXPECT_EQ((*left)->rig().left().intrinsics()[0], 88);
   EXPECT_FALSE((*left)->rig().has_right());
   EXPECT_FALSE(open_recording(bag_path(), {.calibration = (folder_ / "none.yaml").string()}));
 }

@@ -22,15 +22,15 @@ std::string bag_with(const std::string& name, const std::function<std::int64_t(s
                      const std::function<std::int64_t(std::int64_t)>& image_stamp) {
   const std::string path = (std::filesystem::path(::testing::TempDir()) / ("fbvins_clock_" + name + ".bag")).string();
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60);
-  rig.T_BC1.p.x() = 0.1;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60), {}});
+  rig.cameras[1].T_BC.p.x() = 0.1;
   auto bag = Ros1BagWriter::create(path, rig, Time{1000 * kMs});
   EXPECT_TRUE(bag.ok());
   const auto image = std::make_shared<const Image>(80, 60, std::uint8_t{90});
   for (std::int64_t ms = 0; ms < 4000; ms += 5) {
     EXPECT_TRUE(bag->add(ImuSample{Time{stamp(ms)}, Vec3(0.001 * static_cast<double>(ms), 0, 0), Vec3(0, 0, 9.81)}).ok());
     if (ms % 50 == 25) {
-      EXPECT_TRUE(bag->add(StereoFrame{Time{image_stamp(ms)}, image, image}).ok());
+      EXPECT_TRUE(bag->add(StereoFrame{Time{image_stamp(ms)}, {image, image}}).ok());
     }
   }
   EXPECT_TRUE(bag->finish().ok());

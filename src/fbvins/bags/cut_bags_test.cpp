@@ -30,8 +30,8 @@ constexpr std::int64_t kStart_ns = 1'000'000'000, kReading_ns = 5'000'000;
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60);
-  rig.T_BC1 = {Quat::Identity(), {0.1, 0, 0}};
+  rig.cameras.assign(2, {Camera(PinholeRadtan{90, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, 80, 60), {}});
+  rig.cameras[1].T_BC = {Quat::Identity(), {0.1, 0, 0}};
   return rig;
 }
 
@@ -51,7 +51,7 @@ void fill(Writer& writer, int readings) {
     ASSERT_TRUE(writer.add(ImuSample{t, Vec3(0.1, 0, 1e-9 * i), Vec3(0, 9.81, i)}));
     if (i % kReadingsPerFrame == 5) {
       const auto left = image(rng), right = image(rng);
-      ASSERT_TRUE(writer.add(StereoFrame{t, left, right}));
+      ASSERT_TRUE(writer.add(StereoFrame{t, {left, right}}));
     }
     if constexpr (requires { writer.flush(); }) {  // ends a chunk
       if (i % 100 == 99) {

@@ -310,12 +310,8 @@ Result<StereoRig> parse_camera_info(YamlReader left, YamlReader right, const Pos
   // p_C1 = R1^T (R0 p_C0 + shift): rectified frames differ by a shift along x alone.
   const Vec3 shift(c1.shift_m - c0.shift_m, 0, 0);
   const Pose<C1, C0> T_C1C0(Mat3(c1.rectification.transpose() * c0.rectification), Vec3(c1.rectification.transpose() * shift));
-  StereoRig rig;
-  rig.left = c0.camera;
-  rig.right = c1.camera;
-  rig.T_BC0 = T_BC0;
-  rig.T_BC1 = T_BC0 * T_C1C0.inverse();
-  return finished(right, rig);
+  const Pose<B, C1> T_BC1 = T_BC0 * T_C1C0.inverse();
+  return finished(right, with_cameras({}, {{c0.camera, T_BC0}, {c1.camera, T_BC1.cast_frames<B, C0>()}}));
 }
 
 }  // namespace fbvins

@@ -25,10 +25,10 @@ void expect_same(const P& a, const Q& b) {
 
 void expect_rig(const Result<StereoRig>& rig) {
   ASSERT_TRUE(rig) << rig.error().message;
-  expect_same(rig->T_BC0, kLeft);
-  expect_same(rig->T_BC1, kRight);
-  EXPECT_EQ(rig->left.width(), 752);
-  EXPECT_EQ(rig->right.height(), 480);
+  expect_same(rig->T_BC0(), kLeft);
+  expect_same(rig->T_BC1(), kRight);
+  EXPECT_EQ(rig->left().width(), 752);
+  EXPECT_EQ(rig->right().height(), 480);
 }
 
 std::string numbers(const auto& pose) {
@@ -81,8 +81,8 @@ TEST(ForeignCalibration, OpenVinsHasCamerasInTheImu) {
       {"chain.yaml", "%YAML:1.0\n\ncam0:\n" + openvins_camera(kLeft) + "cam1:\n" + openvins_camera(kRight)});
   expect_rig(rig);
   EXPECT_EQ(rig->time_offset_s, -0.004);
-  EXPECT_EQ(rig->right.own_times(), CameraTimes{});
-  EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p2, 0.004);
+  EXPECT_EQ(rig->right().own_times(), CameraTimes{});
+  EXPECT_EQ(std::get<PinholeRadtan>(rig->left().model()).p2, 0.004);
 }
 
 TEST(ForeignCalibration, AFileMayHaveOneCameraOrMoreThanTwo) {
@@ -96,7 +96,7 @@ TEST(ForeignCalibration, AFileMayHaveOneCameraOrMoreThanTwo) {
       parse_openvins_cameras({"chain.yaml", first + "cam1:\n" + openvins_camera(kRight) + "cam2:\n" + openvins_camera(further)});
   ASSERT_TRUE(three) << three.error().message;
   EXPECT_EQ(three->camera_count(), 3);
-  EXPECT_NEAR(three->T_BC(2).p.z() - three->T_BC1.p.z(), 0.25, 1e-6);
+  EXPECT_NEAR(three->T_BC(2).p.z() - three->T_BC1().p.z(), 0.25, 1e-6);
   const auto mono = parse_vins_fusion({"config.yaml", vins_fusion()}, {{"left.yaml", kPinhole}});
   ASSERT_TRUE(mono) << mono.error().message;
   EXPECT_FALSE(mono->has_right());
@@ -105,7 +105,7 @@ TEST(ForeignCalibration, AFileMayHaveOneCameraOrMoreThanTwo) {
 TEST(ForeignCalibration, BasaltIsJsonWithPosesAndNoise) {
   const auto rig = parse_basalt({"calibration.json", basalt()});
   expect_rig(rig);
-  EXPECT_EQ(std::get<KannalaBrandt>(rig->right.model()).k3, -0.03);
+  EXPECT_EQ(std::get<KannalaBrandt>(rig->right().model()).k3, -0.03);
   EXPECT_EQ(rig->imu_noise.accel_noise_density_mps2_rthz, 0.016);
   EXPECT_EQ(rig->imu_noise.gyro_random_walk_radps2_rthz, 0.0001);
   EXPECT_NEAR(rig->time_offset_s, 0.002, 1e-15);
@@ -122,11 +122,11 @@ TEST(ForeignCalibration, BasaltsWideLensesAreRead) {
   };
   const auto ds = with("ds", R"("xi": -0.172, "alpha": 0.593)"), eucm = with("eucm", R"("alpha": 0.63, "beta": 1.04)");
   expect_rig(ds);
-  EXPECT_EQ(std::get<DoubleSphere>(ds->left.model()).xi, -0.172);
-  EXPECT_EQ(std::get<DoubleSphere>(ds->right.model()).alpha, 0.593);
+  EXPECT_EQ(std::get<DoubleSphere>(ds->left().model()).xi, -0.172);
+  EXPECT_EQ(std::get<DoubleSphere>(ds->right().model()).alpha, 0.593);
   expect_rig(eucm);
-  EXPECT_EQ(std::get<ExtendedUnified>(eucm->right.model()).beta, 1.04);
-  EXPECT_EQ(eucm->left.focal_px(), 0.5 * (380.5 + 380.25));
+  EXPECT_EQ(std::get<ExtendedUnified>(eucm->right().model()).beta, 1.04);
+  EXPECT_EQ(eucm->left().focal_px(), 0.5 * (380.5 + 380.25));
   EXPECT_NE(with("ds", R"("xi": -1.2, "alpha": 0.6)").error().message.find("xi is -1.2, not between -1 and 1"),
             std::string::npos);
   EXPECT_NE(with("eucm", R"("alpha": 1.2, "beta": 1)").error().message.find("alpha is 1.2, not between 0 and 1"),
@@ -143,16 +143,16 @@ TEST(ForeignCalibration, TakesALensOfMoreThan180Degrees) {
   replace_all(R"("k1": 0.01, "k2": 0.02, "k3": -0.03)", R"("k1": 0, "k2": 0, "k3": 0)");
   const Result<StereoRig> rig = parse_basalt({"c.json", text});
   ASSERT_TRUE(rig) << rig.error().message;
-  EXPECT_TRUE(rig->left.sees_backwards());
+  EXPECT_TRUE(rig->left().sees_backwards());
 }
 
 TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
   const std::string text = vins_fusion(), name = "config.yaml", left = "left.yaml", right = "right.yaml";
   const auto rig = parse_vins_fusion({name, text}, {{left, kPinhole}, {right, kFisheye}});
   expect_rig(rig);
-  EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).k1, -0.28);
-  EXPECT_EQ(std::get<KannalaBrandt>(rig->right.model()).k4, 0.04);
-  EXPECT_EQ(rig->right.focal_px(), 380.5);
+  EXPECT_EQ(std::get<PinholeRadtan>(rig->left().model()).k1, -0.28);
+  EXPECT_EQ(std::get<KannalaBrandt>(rig->right().model()).k4, 0.04);
+  EXPECT_EQ(rig->right().focal_px(), 380.5);
   EXPECT_NEAR(rig->imu_noise.accel_noise_density_mps2_rthz, 0.1 / std::sqrt(200), 1e-12);
   const std::string mei =
       "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 752\nimage_height: 480\nmirror_parameters:\n   xi: 0.9\ndistortion_parameters:\n"
@@ -160,8 +160,8 @@ TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
       "240\n";
   const auto with_mei = parse_vins_fusion({name, text}, {{left, mei}, {right, kPinhole}});
   expect_rig(with_mei);
-  EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).xi, 0.9);
-  EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).p2, 0.002);
+  EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left().model()).xi, 0.9);
+  EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left().model()).p2, 0.002);
   const std::string other = "model_type: SCARAMUZZA\nimage_width: 752\nimage_height: 480\nprojection_parameters:\n   xi: 1\n";
   EXPECT_EQ(parse_vins_fusion({name, text}, {{left, other}, {right, other}}).error().message,
             "left.yaml:1: model_type: 'SCARAMUZZA' is not supported, only PINHOLE, KANNALA_BRANDT and MEI");
@@ -188,7 +188,7 @@ TEST(ForeignCalibration, CameraInfoSaysHowTheCamerasSeeEachOther) {
   const std::string left = file(R0, 0), right = file(R1, -baseline_C0.norm()), a = "left.yaml", b = "right.yaml";
   const auto rig = parse_camera_info({a, left}, {b, right}, kLeft);
   expect_rig(rig);
-  EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p1, 0.01);
+  EXPECT_EQ(std::get<PinholeRadtan>(rig->left().model()).p1, 0.01);
 }
 
 TEST(ForeignCalibration, FilesAreToldApartByContent) {

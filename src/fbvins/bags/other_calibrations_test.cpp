@@ -56,7 +56,7 @@ std::string vins_mono() {
 TEST(OtherCalibrations, VinsMono) {
   const auto rig = parse_vins_mono({"v.yaml", vins_mono()});
   ASSERT_TRUE(rig) << rig.error().message;
-  expect_same(rig->T_BC0, kLeft);
+  expect_same(rig->T_BC0(), kLeft);
   EXPECT_FALSE(rig->has_right());
   EXPECT_NEAR(rig->imu_noise.accel_noise_density_mps2_rthz, 0.08 / std::sqrt(200), 1e-12);
   EXPECT_EQ(rig->time_offset_s, 0.01);
@@ -81,13 +81,13 @@ std::string orbslam() {
 TEST(OtherCalibrations, OrbSlam) {
   const auto rig = parse_orbslam({"o.yaml", orbslam()});
   ASSERT_TRUE(rig) << rig.error().message;
-  expect_same(rig->T_BC0, kLeft);
-  expect_same(rig->T_BC1, kRight);
-  EXPECT_EQ(rig->right.intrinsics()[0], 457.5);
-  EXPECT_EQ(rig->left.distortion(), (std::vector{-0.28, 0.07, 0.0002, 1.7e-05}));
+  expect_same(rig->T_BC0(), kLeft);
+  expect_same(rig->T_BC1(), kRight);
+  EXPECT_EQ(rig->right().intrinsics()[0], 457.5);
+  EXPECT_EQ(rig->left().distortion(), (std::vector{-0.28, 0.07, 0.0002, 1.7e-05}));
   EXPECT_EQ(rig->imu_noise.accel_noise_density_mps2_rthz, 2e-3);
   const std::string with_k3 = orbslam() + "Camera1.k3: -0.01\n";
-  EXPECT_EQ(parse_orbslam({"o.yaml", with_k3})->left.model_name(), "pinhole-radtan5");
+  EXPECT_EQ(parse_orbslam({"o.yaml", with_k3})->left().model_name(), "pinhole-radtan5");
   EXPECT_NE(message(parse_orbslam({"o.yaml", replaced(orbslam(), "IMU.T_b_c1", "IMU.T")})).find("the camera's place on the IMU"),
             std::string::npos);
   EXPECT_NE(
@@ -103,7 +103,7 @@ TEST(OtherCalibrations, OrbSlamsOlderFilesOfARectifiedPair) {
       "\nIMU.NoiseGyro: 1.7e-04\nIMU.NoiseAcc: 2.0e-03\nIMU.GyroWalk: 1.9e-05\nIMU.AccWalk: 3.e-03\nIMU.Frequency: 200\n";
   const auto rig = parse_orbslam({"o.yaml", older});
   ASSERT_TRUE(rig) << rig.error().message;
-  EXPECT_LT((rig->T_BC1.p - kLeft * Vec3(0.1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((rig->T_BC1().p - kLeft * Vec3(0.1, 0, 0)).norm(), 1e-12);
   EXPECT_FALSE(parse_orbslam({"o.yaml", older + "DepthMapFactor: 1000.0\n"})->has_right())
       << "a depth camera's bf is no second camera";
 }
@@ -130,9 +130,9 @@ std::string oak() {
 TEST(OtherCalibrations, Oak) {
   const auto rig = parse_oak({"oak.json", oak()});
   ASSERT_TRUE(rig) << rig.error().message;
-  expect_same(rig->T_BC0, kLeft);
-  expect_same(rig->T_BC1, kRight);
-  EXPECT_EQ(rig->left.model_name(), "pinhole-rational");
+  expect_same(rig->T_BC0(), kLeft);
+  expect_same(rig->T_BC1(), kRight);
+  EXPECT_EQ(rig->left().model_name(), "pinhole-rational");
   const std::string without = replaced(oak(), R"("toCameraSocket": 0}, "stereo)", R"("toCameraSocket": -1}, "stereo)");
   EXPECT_NE(message(parse_oak({"oak.json", without})).find("the device's IMU has no place"), std::string::npos);
   EXPECT_NE(message(parse_oak({"oak.json", "{\"cameraData\": []}"})), "read");
@@ -168,8 +168,8 @@ TEST_F(OtherCalibrationFiles, KimerasAreThreeBesideOneAnother) {
   for (const std::string& given : {left, right}) {
     rig = load_calibration(given);
     ASSERT_TRUE(rig) << rig.error().message;
-    expect_same(rig->T_BC0, kLeft);
-    expect_same(rig->T_BC1, kRight);
+    expect_same(rig->T_BC0(), kLeft);
+    expect_same(rig->T_BC1(), kRight);
     EXPECT_EQ(rig->imu_noise.accel_noise_density_mps2_rthz, 0.003);
     EXPECT_EQ(rig->time_offset_s, -0.005);
   }

@@ -171,7 +171,7 @@ class BagRecording {
     DatasetInfo& info = out_.info;
     std::vector<std::vector<ImageRow>> cameras;
     for (std::size_t i = 0; i < topics_.cameras.size(); ++i)
-      cameras.push_back(rows_of(topics_.cameras[i], i == 0 ? info.left : i == 1 ? info.right : info.more));
+      cameras.push_back(rows_of(topics_.cameras[i], info.camera(static_cast<int>(i))));
     const std::vector<ImageRow> depths = topics_.depth.empty() ? std::vector<ImageRow>{} : rows_of(topics_.depth, info.depth);
     const double tolerance_ms = options_.dataset.pair_tolerance_ms;
     out_.frames = join_images(std::move(cameras), depths, own_offsets(out_.rig), tolerance_ms, info);
@@ -179,7 +179,7 @@ class BagRecording {
       return Error{ErrorCode::malformed,
                    fmt::format("no stamp on {} lies within {} ms of one on {}", topic, tolerance_ms, topics_.cameras.front())};
     };
-    if (topics_.cameras.size() > 1 && info.left.unpaired == info.left.listed) return never(topics_.cameras[1]);
+    if (topics_.cameras.size() > 1 && info.cameras[0].unpaired == info.cameras[0].listed) return never(topics_.cameras[1]);
     if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(topics_.depth);
     if (!topics_.imu.empty()) out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);
     return read_aiding(contents_, topics_, out_);

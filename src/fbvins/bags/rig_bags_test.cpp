@@ -49,8 +49,8 @@ class RigBags : public ::testing::Test {
     ASSERT_TRUE(bag) << bag.error().message;
     for (int i = 0; i < 10; ++i) {
       ASSERT_TRUE(bag->add(ImuSample{at(i), Vec3::Zero(), Vec3(0, 0, 9.81)}));
-      StereoFrame frame{at(i), shade(i), rig.has_right() ? shade(i + 20) : nullptr};
-      for (int k = 2; k < rig.camera_count(); ++k) frame.more.push_back(i == 4 && k == 2 ? nullptr : shade(i + 20 * k));
+      StereoFrame frame{at(i), {shade(i), rig.has_right() ? shade(i + 20) : nullptr}};
+      for (int k = 2; k < rig.camera_count(); ++k) frame.set_image(k, i == 4 && k == 2 ? nullptr : shade(i + 20 * k));
       frame.offsets.set(2, Duration{1'000'000});
       if (rig.depth) {
         const Camera& seen_by = rig.depth_camera();
@@ -96,7 +96,7 @@ TEST_F(RigBags, FourCamerasAreReadAsWritten) {
       }
     }
   }
-  EXPECT_EQ(data->info().more.listed, 19);
+  EXPECT_EQ(data->info().further().listed, 19);
 }
 
 TEST_F(RigBags, SomeOfTheCamerasMayBeChosen) {
@@ -107,8 +107,8 @@ TEST_F(RigBags, SomeOfTheCamerasMayBeChosen) {
   const auto last = open({.topics = {"/cam3/image_raw", "/imu0"}});
   ASSERT_TRUE(last);
   EXPECT_EQ(last->rig().camera_count(), 1);
-  EXPECT_EQ(last->rig().left.intrinsics()[0], 93);
-  EXPECT_EQ(frames(*last)[7].left->at(5, 6), 67);
+  EXPECT_EQ(last->rig().left().intrinsics()[0], 93);
+  EXPECT_EQ(frames(*last)[7].left()->at(5, 6), 67);
   EXPECT_NE(open_recording(path(), {.dataset = {.rig = rig_of_cameras(2)},
                                     .topics = {"/cam0/image_raw", "/cam1/image_raw", "/cam3/image_raw"}})
                 .error()
@@ -130,8 +130,8 @@ TEST_F(RigBags, OneCameraIsARecording) {
 TEST_F(RigBags, TwoImagesSideBySideAreThoseOfTwoCameras) {
   StereoRig wide = rig_of_cameras(1);
   const StereoRig two = rig_of_cameras(2);
-  const int width = two.left.width(), height = two.left.height();
-  wide.left = Camera(PinholeRadtan{90, 91, 40, 30, 0, 0, 0, 0}, 2 * width, height);
+  const int width = two.left().width(), height = two.left().height();
+  wide.cameras[0].camera = Camera(PinholeRadtan{90, 91, 40, 30, 0, 0, 0, 0}, 2 * width, height);
   auto bag = Ros1BagWriter::create(path(), wide, Time{1'000'000'000});
   ASSERT_TRUE(bag) << bag.error().message;
   for (std::int64_t i = 0; i < 60; ++i) {
@@ -141,7 +141,7 @@ TEST_F(RigBags, TwoImagesSideBySideAreThoseOfTwoCameras) {
     auto both = std::make_shared<Image>(2 * width, height, std::uint8_t{10});
     for (int y = 0; y < height; ++y)
       for (int x = width; x < 2 * width; ++x) both->at(x, y) = 200;
-    ASSERT_TRUE(bag->add(StereoFrame{t, both, nullptr}));
+    ASSERT_TRUE(bag->add(StereoFrame{t, {both}}));
   }
   ASSERT_TRUE(bag->finish());
   const auto data = open({.dataset = {.rig = two}});
@@ -154,10 +154,10 @@ TEST_F(RigBags, TwoImagesSideBySideAreThoseOfTwoCameras) {
     const auto* frame = std::get_if<StereoFrame>(&*event);
     if (!frame) continue;
     ++frames;
-    ASSERT_TRUE(frame->left && frame->right);
-    EXPECT_EQ(frame->left->width(), width);
-    EXPECT_EQ(frame->left->at(width - 1, 3), 10);
-    EXPECT_EQ(frame->right->at(0, 3), 200);
+    ASSERT_TRUE(frame->left() && frame->right());
+    EXPECT_EQ(frame->left()->width(), width);
+    EXPECT_EQ(frame->left()->at(width - 1, 3), 10);
+    EXPECT_EQ(frame->right()->at(0, 3), 200);
   }
   EXPECT_EQ(frames, 6);
 }
@@ -179,7 +179,7 @@ TEST_F(RigBags, DepthImagesAreOfTheCamera) {
 TEST_F(RigBags, ADepthSensorThatLiesElsewhereHasItsOwnLensAndPose) {
   const StereoRig one = rig_of_cameras(1);
   const MountedCamera own{Camera(PinholeRadtan{50, 51, 20, 16, 0.1, 0, 0, 0}, 40, 32),
-                          one.T_BC0 * Pose<C0, C0>(so3_exp({0.01, 0.02, 0.03}), Vec3(0.015, 0.002, 0.001))};
+                          one.T_BC0() * Pose<C0, C0>(so3_exp({0.01, 0.02, 0.03}), Vec3(0.015, 0.002, 0.001))};
   write(with_depth(one, {.noise_at_1m_m = 0.007, .own = own}));
   const auto expect_own = [&](const Dataset& data, double tolerance) {
     ASSERT_TRUE(data.rig().depth && data.rig().depth->own);
@@ -226,7 +226,7 @@ TEST(RigTopics, CamerasThatNobodyHasCalibratedAreLeftOut) {
   for (const std::string number : {"0", "1", "2", "3"}) {
     contents.images["/cam" + number + "/image"];
     if (number == "2") continue;
-    contents.cameras["/cam" + number + "/camera_info"] = {rig_of_cameras(1).left, "frame" + number};
+    contents.cameras["/cam" + number + "/camera_info"] = {rig_of_cameras(1).left(), "frame" + number};
     contents.transforms.push_back({"imu", "frame" + number, Quat::Identity(), Vec3(0, 0.1 * (number[0] - '0'), 0)});
   }
   auto topics = choose_topics(contents, {}, {});
@@ -248,24 +248,24 @@ TEST(RigTopics, RectifiedImagesAreThoseOfRAndP) {
   const Camera straight(PinholeRadtan{80, 80, 41, 31}, kWidth, kHeight);
   for (const std::string side : {"left", "right"}) {
     contents.images["/" + side + "/image_rect"], contents.images["/" + side + "/image_raw"];
-    contents.cameras["/" + side + "/camera_info"] = {rig_of_cameras(1).left, side, BagCamera::Rectified{straight, R, 0.1}};
+    contents.cameras["/" + side + "/camera_info"] = {rig_of_cameras(1).left(), side, BagCamera::Rectified{straight, R, 0.1}};
     contents.transforms.push_back({"imu", side, Quat::Identity(), Vec3(0, side == "left" ? 0 : 0.2, 0)});
   }
   const ChosenTopics rectified{{"/left/image_rect", "/right/image_rect"}, "/imu", "", ""},
       raw{{"/left/image_raw", "/right/image_raw"}, "/imu", "", ""};
-  EXPECT_EQ(rig_of(contents, raw)->left.intrinsics()[0], 90);
+  EXPECT_EQ(rig_of(contents, raw)->left().intrinsics()[0], 90);
   EXPECT_EQ(rectified_topics(contents, raw), "");
   EXPECT_NE(rectified_topics(contents, rectified).find("/left/image_rect, /right/image_rect are taken as rectified"),
             std::string::npos);
   auto rig = rig_of(contents, rectified);
   ASSERT_TRUE(rig) << rig.error().message;
-  EXPECT_EQ(rig->left.intrinsics()[0], 80);
-  EXPECT_LT((rig->T_BC0.R() - R.transpose()).norm(), 1e-12);
-  EXPECT_LT((rig->T_BC1.p - Vec3(0, 0.2, 0)).norm(), 1e-12) << "where its own frame is";
+  EXPECT_EQ(rig->left().intrinsics()[0], 80);
+  EXPECT_LT((rig->T_BC0().R() - R.transpose()).norm(), 1e-12);
+  EXPECT_LT((rig->T_BC1().p - Vec3(0, 0.2, 0)).norm(), 1e-12) << "where its own frame is";
   contents.cameras["/right/camera_info"].frame = "left";
   rig = rig_of(contents, rectified);
   ASSERT_TRUE(rig) << rig.error().message;
-  EXPECT_LT((rig->T_BC1.p - R.transpose() * Vec3(0.1, 0, 0)).norm(), 1e-12) << "in the first one's rectified axes";
+  EXPECT_LT((rig->T_BC1().p - R.transpose() * Vec3(0.1, 0, 0)).norm(), 1e-12) << "in the first one's rectified axes";
 }
 
 TEST(RigTopics, ABinnedAndCutImageHasItsOwnLens) {
@@ -308,8 +308,8 @@ TEST(RigTopics, DepthImagesAreNoCameras) {
 
 TEST(RigTopics, DepthImagesOfAnotherCameraAreNotRegistered) {
   BagContents contents;
-  contents.cameras["/colour/camera_info"] = {rig_of_cameras(1).left, "colour"};
-  contents.cameras["/depth/camera_info"] = {rig_of_cameras(1).left, "colour"};
+  contents.cameras["/colour/camera_info"] = {rig_of_cameras(1).left(), "colour"};
+  contents.cameras["/depth/camera_info"] = {rig_of_cameras(1).left(), "colour"};
   const ChosenTopics topics{{"/colour/image"}, "", "", "/depth/image"};
   EXPECT_EQ(not_registered(contents, topics), "");
   contents.cameras["/depth/camera_info"].frame = "infra";
@@ -320,7 +320,7 @@ TEST(RigTopics, DepthImagesOfAnotherCameraAreNotRegistered) {
   const auto own = depth_camera_of(contents, topics, rig_of_cameras(1));
   ASSERT_TRUE(own);
   EXPECT_EQ(own->camera.focal_px(), 70);
-  EXPECT_LT((own->T_BC.p - rig_of_cameras(1).T_BC0 * Vec3(0.015, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((own->T_BC.p - rig_of_cameras(1).T_BC0() * Vec3(0.015, 0, 0)).norm(), 1e-12);
   contents.transforms.clear();
   EXPECT_FALSE(depth_camera_of(contents, topics, rig_of_cameras(1))) << "nobody says where it is";
 }

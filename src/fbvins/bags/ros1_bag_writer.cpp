@@ -194,8 +194,8 @@ Ros1BagWriter& Ros1BagWriter::operator=(Ros1BagWriter&&) noexcept = default;
 Result<void> Ros1BagWriter::add(const ImuSample& sample) { return state_->add(ros1::kImu, sample.t, ros1::imu_message(sample)); }
 
 Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
-  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i) {
-    const std::shared_ptr<const Image> image = frame.image(i);
+  for (int i = 0; i < static_cast<int>(frame.images.size()); ++i) {
+    const std::shared_ptr<const Image>& image = frame.image(i);
     if (!image) continue;
     const std::string message = ros1::image_message(frame.t + frame.offsets.of(i), camera_frame(i), *image);
     if (Result<void> done = state_->add(ros1::image_number(i), frame.t, message); !done) return done;

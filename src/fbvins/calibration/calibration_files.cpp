@@ -111,7 +111,7 @@ RigCalibration rig_calibration(const StereoRig& rig) {
   RigCalibration out;
   for (int i = 0; i < rig.camera_count(); ++i) {
     out.cameras.push_back(rig.camera(i));
-    out.T_CnC0.push_back((rig.T_BC(i).inverse() * rig.T_BC0).cast_frames<Cn, C0>());
+    out.T_CnC0.push_back((rig.T_BC(i).inverse() * rig.T_BC0()).cast_frames<Cn, C0>());
     out.T_BC.push_back(rig.T_BC(i).cast_frames<B, Cn>());
   }
   out.time_offset_s = rig.time_offset_s;

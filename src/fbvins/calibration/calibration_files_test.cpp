@@ -25,12 +25,12 @@ TEST(CalibrationFiles, WhatIsWrittenForKalibrIsReadBack) {
     const RigCalibration rig = rig_with(camera);
     const auto read = parse_kalibr_camchain({"camchain-imucam.yaml", to_kalibr_camchain(rig)});
     ASSERT_TRUE(read) << camera.model_name() << ": " << read.error().message;
-    EXPECT_EQ(read->left.model_name(), camera.model_name());
-    EXPECT_EQ(read->left.width(), camera.width());
-    EXPECT_EQ(lens_parameters(read->left.model()), lens_parameters(rig.cameras[0].model()));
-    EXPECT_EQ(lens_parameters(read->right.model()), lens_parameters(rig.cameras[1].model()));
-    EXPECT_LT((read->T_BC0.p - rig.T_BC[0].p).norm() + (read->T_BC1.p - rig.T_BC[1].p).norm(), 1e-12);
-    EXPECT_LT(so3_log(read->T_BC1.q.conjugate() * rig.T_BC[1].q).norm(), 1e-12);
+    EXPECT_EQ(read->left().model_name(), camera.model_name());
+    EXPECT_EQ(read->left().width(), camera.width());
+    EXPECT_EQ(lens_parameters(read->left().model()), lens_parameters(rig.cameras[0].model()));
+    EXPECT_EQ(lens_parameters(read->right().model()), lens_parameters(rig.cameras[1].model()));
+    EXPECT_LT((read->T_BC0().p - rig.T_BC[0].p).norm() + (read->T_BC1().p - rig.T_BC[1].p).norm(), 1e-12);
+    EXPECT_LT(so3_log(read->T_BC1().q.conjugate() * rig.T_BC[1].q).norm(), 1e-12);
     EXPECT_EQ(read->time_offset_s, rig.time_offset_s);
   }
 }
@@ -42,12 +42,12 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
   rig.imu_noise = {1.5e-3, 2.5e-2, 3.5e-5, 4.5e-3, 400, 8, 80};
   rig.imu_noise.axes.accel << 1.01, 0.002, 0, -0.004, 0.99, 0.001, 0.003, 0, 1.02;
   rig.time_offset_s = -0.0123, rig.line_delay_s = 3e-5;
-  rig.right.set_own_times({0.002, 1e-5});
+  rig.cameras[1].camera.set_own_times({0.002, 1e-5});
   rig.imu_noise.axes.gyro(0, 0) = 1.0078125, rig.imu_noise.axes.accel(2, 1) = 0.015625;
   const std::string text = to_kalibr_rig(rig_calibration(rig));
   const auto read = parse_kalibr_camchain({"fixed.yaml", text});
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_LT((read->T_BC0.p - rig.T_BC0.p).norm() + (read->T_BC1.p - rig.T_BC1.p).norm(), 1e-12);
+  EXPECT_LT((read->T_BC0().p - rig.T_BC0().p).norm() + (read->T_BC1().p - rig.T_BC1().p).norm(), 1e-12);
   EXPECT_EQ(read->time_offset_s, rig.time_offset_s);
   EXPECT_EQ(read->line_delay_s, rig.line_delay_s);
   EXPECT_DOUBLE_EQ(read->times(1).time_offset_s, -0.0103);
@@ -106,7 +106,7 @@ TEST(CalibrationFiles, TheSecondCameraIsAlsoFoundThroughTheFirst) {
   text.replace(second, 9, "T_ignored");  // then T_cn_cnm1 counts
   const auto read = parse_kalibr_camchain({"camchain-imucam.yaml", text});
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_LT((read->T_BC1.p - rig.T_BC[1].p).norm(), 1e-12);
+  EXPECT_LT((read->T_BC1().p - rig.T_BC[1].p).norm(), 1e-12);
 }
 
 TEST(CalibrationFiles, NoiseOfTheImuIsReadBack) {

@@ -33,10 +33,10 @@ TEST(FlightRig, AStepLeadsToTheRigThatItIsTheStepTo) {
 
 TEST(FlightRig, AStereoRigAndBack) {
   const StereoRig rig = flight_scene_rig(), back = refined_rig(rig, flight_rig(rig));
-  EXPECT_LT((back.T_BC1.p - rig.T_BC1.p).norm(), 1e-15);
-  EXPECT_LT(so3_log(back.T_BC1.q.conjugate() * rig.T_BC1.q).norm(), 1e-15);
+  EXPECT_LT((back.T_BC1().p - rig.T_BC1().p).norm(), 1e-15);
+  EXPECT_LT(so3_log(back.T_BC1().q.conjugate() * rig.T_BC1().q).norm(), 1e-15);
   EXPECT_EQ(back.time_offset_s, rig.time_offset_s);
-  EXPECT_EQ(back.left.intrinsics(), rig.left.intrinsics());
+  EXPECT_EQ(back.left().intrinsics(), rig.left().intrinsics());
 }
 
 TEST(FlightView, DerivativesAreThoseOfDifferences) {
@@ -107,7 +107,7 @@ TEST(FlightCalibration, AWrongTimeOffsetIsMended) {
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_TRUE(found->better) << found->verdict;
   EXPECT_NEAR(found->rig.time_offset_s, truth.time_offset_s, 2e-4);
-  EXPECT_EQ(found->rig.left.intrinsics(), given.left.intrinsics());
+  EXPECT_EQ(found->rig.left().intrinsics(), given.left().intrinsics());
 }
 
 TEST(FlightCalibration, WhatCannotBeUsedIsSaidInASentence) {

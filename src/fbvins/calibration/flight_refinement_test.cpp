@@ -32,12 +32,12 @@ FlightCalibration refined(const StereoRig& truth, const StereoRig& given, const 
 TEST(FlightRefinement, AWrongCalibrationIsMended) {
   const StereoRig truth = flight_scene_rig();
   StereoRig given = truth;
-  given.T_BC0.q = (truth.T_BC0.q * so3_exp(Vec3(0.3, -0.4, 0.2) * kDegree)).normalized();
-  given.T_BC0.p += Vec3(0.01, -0.015, 0.008);
-  given.T_BC1 = given.T_BC0 * truth.T_C1C0().inverse();
-  given.T_BC1.q = (given.T_BC1.q * so3_exp(Vec3(0.1, 0.05, -0.1) * kDegree)).normalized();
+  given.cameras[0].T_BC.q = (truth.T_BC0().q * so3_exp(Vec3(0.3, -0.4, 0.2) * kDegree)).normalized();
+  given.cameras[0].T_BC.p += Vec3(0.01, -0.015, 0.008);
+  given.cameras[1].T_BC = (given.T_BC0() * truth.T_C1C0().inverse()).cast_frames<B, C0>();
+  given.cameras[1].T_BC.q = (given.T_BC1().q * so3_exp(Vec3(0.1, 0.05, -0.1) * kDegree)).normalized();
   given.time_offset_s -= 0.003;
-  given.left = given.left.with_lens(PinholeRadtan{462.0, 460.0, 368.5, 247.0, -0.2834, 0.0740, 1.9e-4, 1.8e-5});
+  given.cameras[0].camera = given.left().with_lens(PinholeRadtan{462.0, 460.0, 368.5, 247.0, -0.2834, 0.0740, 1.9e-4, 1.8e-5});
   const FlightCalibration found = refined(truth, given);
   EXPECT_TRUE(found.better) << found.verdict;
   const FlightRig exact = flight_rig(truth);
@@ -61,7 +61,7 @@ TEST(FlightRefinement, AWrongCalibrationIsMended) {
 TEST(FlightRefinement, WhatIsRoughAloneIsRefinedHoweverLittle) {
   const StereoRig truth = flight_scene_rig();
   StereoRig given = truth;
-  given.T_BC1.q = (given.T_BC1.q * so3_exp(Vec3(0.02, -0.02, 0.02) * kDegree)).normalized();
+  given.cameras[1].T_BC.q = (given.T_BC1().q * so3_exp(Vec3(0.02, -0.02, 0.02) * kDegree)).normalized();
   given.time_offset_s += 0.002;
   const FlightTracks tracks = simulated_flight_tracks(truth, given.time_offset_s, {});
   FlightCalibrationOptions options;
@@ -74,7 +74,7 @@ TEST(FlightRefinement, WhatIsRoughAloneIsRefinedHoweverLittle) {
   };
   EXPECT_LT(off(found->rig), 0.4 * off(given));
   EXPECT_EQ(found->rig.time_offset_s, given.time_offset_s) << "is not called rough";
-  EXPECT_EQ(found->rig.T_BC0.p, given.T_BC0.p);
+  EXPECT_EQ(found->rig.T_BC0().p, given.T_BC0().p);
 }
 
 TEST(FlightRefinement, AGoodCalibrationStaysExactly) {
@@ -90,8 +90,8 @@ TEST(FlightRefinement, AGoodCalibrationStaysExactly) {
 TEST(FlightRefinement, WithoutMotionTheLeverIsNotDetermined) {
   const StereoRig truth = flight_scene_rig();
   StereoRig given = truth;
-  given.T_BC0.p += Vec3(0.01, 0, 0);
-  given.T_BC1.p += Vec3(0.01, 0, 0);
+  given.cameras[0].T_BC.p += Vec3(0.01, 0, 0);
+  given.cameras[1].T_BC.p += Vec3(0.01, 0, 0);
   const FlightCalibration found = refined(truth, given, {.rotation_rad = 0});
   for (const char* name : {"cam0.imu.px", "cam0.imu.py", "cam0.imu.pz"}) {
     EXPECT_EQ(parameter(found, name).finding, FlightFinding::not_determined) << name;
@@ -102,24 +102,24 @@ TEST(FlightRefinement, WithoutMotionTheLeverIsNotDetermined) {
 TEST(FlightRefinement, OneCameraIsMended) {
   const StereoRig truth = with_one_camera(flight_scene_rig());
   StereoRig given = truth;
-  given.T_BC0.q = (truth.T_BC0.q * so3_exp(Vec3(0.3, -0.4, 0.2) * kDegree)).normalized();
-  given.T_BC1.q = given.T_BC0.q;
+  given.cameras[0].T_BC.q = (truth.T_BC0().q * so3_exp(Vec3(0.3, -0.4, 0.2) * kDegree)).normalized();
+  given.cameras[1].T_BC.q = given.T_BC0().q;
   given.time_offset_s += 0.003;
   const FlightCalibration found = refined(truth, given);
   EXPECT_TRUE(found.better) << found.verdict;
   EXPECT_EQ(found.rig.camera_count(), 1);
   EXPECT_NEAR(found.rig.time_offset_s, truth.time_offset_s, 2e-4);
-  EXPECT_LT(so3_log(truth.T_BC0.q.conjugate() * found.rig.T_BC0.q).norm(), 0.1 * kDegree);
+  EXPECT_LT(so3_log(truth.T_BC0().q.conjugate() * found.rig.T_BC0().q).norm(), 0.1 * kDegree);
 }
 
 TEST(FlightRefinement, TheThirdOfThreeCamerasIsMended) {
   StereoRig truth = flight_scene_rig();
-  Pose<B, C0> T_BC2 = truth.T_BC0;  // looks backwards
+  Pose<B, C0> T_BC2 = truth.T_BC0();  // looks backwards
   T_BC2.q = (T_BC2.q * so3_exp(Vec3(0, 180, 0) * kDegree)).normalized();
   T_BC2.p += Vec3(0.02, 0.03, -0.06);
-  truth.more.push_back({truth.left, T_BC2});
+  truth.cameras.push_back({truth.left(), T_BC2});
   StereoRig given = truth;
-  given.more[0].T_BC.q = (T_BC2.q * so3_exp(Vec3(0.3, -0.2, 0.2) * kDegree)).normalized();
+  given.cameras[2].T_BC.q = (T_BC2.q * so3_exp(Vec3(0.3, -0.2, 0.2) * kDegree)).normalized();
   const FlightCalibration found = refined(truth, given);
   EXPECT_TRUE(found.better) << found.verdict;
   ASSERT_EQ(found.rig.camera_count(), 3);

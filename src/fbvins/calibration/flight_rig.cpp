@@ -55,10 +55,10 @@ void add_vector(const std::string& name, const char* unit, FlightGroup group, in
 
 FlightRig flight_rig(const StereoRig& rig) {
   FlightRig out;
-  out.T_BC0 = rig.T_BC0;
+  out.T_BC0 = rig.T_BC0();
   for (int k = 0; k < rig.camera_count(); ++k) {
     out.cameras.push_back(rig.camera(k));
-    out.T_CnC0.push_back((rig.T_BC(k).inverse() * rig.T_BC0.cast_frames<B, C0>()).cast_frames<Cn, C0>());
+    out.T_CnC0.push_back((rig.T_BC(k).inverse() * rig.T_BC0().cast_frames<B, C0>()).cast_frames<Cn, C0>());
   }
   out.T_CnC0[0] = {};
   out.time_offset_s = rig.time_offset_s;

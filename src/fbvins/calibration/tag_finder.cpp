@@ -71,8 +71,8 @@ Result<TagFinder> TagFinder::create(const StereoRig& rig, TagSurvey survey) {
 }
 
 TagFinder::TagFinder(const StereoRig& rig, TagSurvey survey, TagDetector detector)
-    : camera_(rig.left),
-      T_BC0_(rig.T_BC0),
+    : camera_(rig.left()),
+      T_BC0_(rig.T_BC0()),
       survey_(std::move(survey)),
       board_{BoardKind::aprilgrid, 1, 1, survey_.size_m, 0.3},
       detector_(std::move(detector)) {
@@ -112,12 +112,12 @@ std::optional<TagAnchor> TagFinder::posed(const TagDetection& seen, const ImageV
 
 std::vector<TagAnchor> TagFinder::find(const StereoFrame& frame) {
   std::vector<TagAnchor> out;
-  if (!frame.left) return out;
-  const std::vector<TagDetection> all = detector_.find(frame.left->view());
+  if (!frame.left()) return out;
+  const std::vector<TagDetection> all = detector_.find(frame.left()->view());
   for (const TagDetection& seen : all) {
     const auto of_id = std::ranges::count(all, seen.id, &TagDetection::id);
     if (of_id > 1 || !survey_.T_AT.contains(seen.id)) continue;
-    auto anchor = posed(seen, frame.left->view());
+    auto anchor = posed(seen, frame.left()->view());
     if (!anchor) continue;
     anchor->t = frame.t;
     if (impossible(*anchor).empty()) out.push_back(*anchor);

@@ -18,8 +18,8 @@ const Board kTag{.columns = 1, .rows = 1, .size_m = 0.2, .spacing = 0.3};
 
 StereoRig rig() {
   StereoRig out;
-  out.left = out.right = example_cameras()[0];
-  out.T_BC0 = {so3_exp(Vec3(-1.2, 1.2, -1.2)), Vec3(0.05, 0.06, -0.01)};
+  out.cameras.assign(2, {example_cameras()[0], {}});
+  out.cameras[0].T_BC = {so3_exp(Vec3(-1.2, 1.2, -1.2)), Vec3(0.05, 0.06, -0.01)};
   return out;
 }
 
@@ -29,7 +29,7 @@ StereoFrame image_of(const Pose<C0, T>& T_C0T, std::uint64_t seed) {
   Rng rng(seed);
   const BoardCamera renderer(example_cameras()[0], *BoardPattern::create(kTag));
   const Pose<Cn, T> T_CnT(T_C0T.q, T_C0T.p);
-  return {Time{77}, std::make_shared<Image>(renderer.render({T_CnT}, {}, rng)), nullptr};
+  return {Time{77}, {std::make_shared<Image>(renderer.render({T_CnT}, {}, rng))}};
 }
 
 /// The tag `distance_m` ahead, turned by an angle from facing the camera.
@@ -50,7 +50,7 @@ TEST(TagFinder, PosesAreAsCertainAsTheySay) {
       if (tags.empty()) continue;
       ASSERT_EQ(tags.size(), 1u);
       EXPECT_EQ(tags[0].t, Time{77});
-      const Pose<B, Tag> truth = rig().T_BC0 * Pose<C0, Tag>(T_CT.q, T_CT * Vec3(0.1, 0.1, 0));
+      const Pose<B, Tag> truth = rig().T_BC0() * Pose<C0, Tag>(T_CT.q, T_CT * Vec3(0.1, 0.1, 0));
       Vec6 e;
       e << tags[0].T_BT.p - truth.p, so3_log(truth.q.conjugate() * tags[0].T_BT.q);
       const double size = e.dot(tags[0].covariance.inverse() * e);

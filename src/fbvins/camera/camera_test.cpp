@@ -149,7 +149,8 @@ TEST(Camera, InsideCountsPixelCentres) {
 
 TEST(StereoRig, RelativePoseTakesLeftToRight) {
   StereoRig rig;
-  rig.T_BC1.p = Vec3(0.11, 0, 0);
+  rig.cameras.resize(2);
+  rig.cameras[1].T_BC.p = Vec3(0.11, 0, 0);
   EXPECT_LT((rig.T_C1C0() * Vec3(0, 0, 1) - Vec3(-0.11, 0, 1)).norm(), 1e-15);
 }
 

@@ -47,20 +47,21 @@ TEST(CameraTimes, StayWithTheirCameras) {
   const StereoRig right = with_one_camera(rig, true);
   EXPECT_DOUBLE_EQ(right.time_offset_s, 0.009);
   EXPECT_DOUBLE_EQ(right.line_delay_s, 4e-5);
-  EXPECT_EQ(right.left.own_times(), CameraTimes{});
+  EXPECT_EQ(right.left().own_times(), CameraTimes{});
   const StereoRig pair = fbvins::rig_of(rig, {2, 3});
   EXPECT_DOUBLE_EQ(pair.time_offset_s, 0.001);
   EXPECT_DOUBLE_EQ(pair.times(1).time_offset_s, 0.003);
   EXPECT_NEAR(pair.times(1).line_delay_s, 0, 1e-18);
   EXPECT_EQ(own_offsets(pair), ExposureOffsets({{}, Duration{2'000'000}}));
-  EXPECT_EQ(scaled_to(rig.right, 320, 240)->own_times(), rig.right.own_times());
-  EXPECT_EQ(rig.right.with_lens(PinholeRadtan{}).own_times(), rig.right.own_times());
+  EXPECT_EQ(scaled_to(rig.right(), 320, 240)->own_times(), rig.right().own_times());
+  EXPECT_EQ(rig.right().with_lens(PinholeRadtan{}).own_times(), rig.right().own_times());
 }
 
 TEST(CameraTimes, FacesOfAWideLensHaveThoseOfTheLens) {
   StereoRig rig = rig_of(2);
-  rig.right = Camera(KannalaBrandt{.fx = 180, .fy = 180, .cx = 319.5, .cy = 319.5, .k1 = 0, .k2 = 0, .k3 = 0, .k4 = 0}, 640, 640);
-  ASSERT_TRUE(rig.right.sees_backwards());
+  rig.cameras[1].camera =
+      Camera(KannalaBrandt{.fx = 180, .fy = 180, .cx = 319.5, .cy = 319.5, .k1 = 0, .k2 = 0, .k3 = 0, .k4 = 0}, 640, 640);
+  ASSERT_TRUE(rig.right().sees_backwards());
   rig = with_times(rig, {{0, 0}, {0.002, 1e-5}});
   const VirtualPinholes faces(rig);
   for (int i = 0; i < faces.rig().camera_count(); ++i) EXPECT_EQ(faces.rig().times(i), rig.times(faces.lens_of(i))) << i;

@@ -137,7 +137,7 @@ Result<void> check_depth(const StereoRig& rig, std::string_view origin) {
   if (Result<void> good = check_camera(sensor.own->camera, "depth", origin); !good) return good;
   if (!is_transform(sensor.own->T_BC)) return malformed(origin, "the pose of the depth sensor is none");
   constexpr double kFarthest_m = 1;
-  const double apart_m = (sensor.own->T_BC.p - rig.T_BC0.p).norm();
+  const double apart_m = (sensor.own->T_BC.p - rig.T_BC0().p).norm();
   if (!(apart_m < kFarthest_m))
     return malformed(origin, fmt::format("the depth sensor is {:.3g} m from the camera, more than {} m", apart_m, kFarthest_m));
   return {};
@@ -160,18 +160,15 @@ Result<void> check_times(const StereoRig& rig, std::string_view origin) {
 }  // namespace
 
 Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
-  if (Result<void> good = check_camera(rig.left, "left", origin); !good) return good;
-  if (rig.has_right())
-    if (Result<void> good = check_camera(rig.right, "right", origin); !good) return good;
+  if (rig.cameras.empty()) return malformed(origin, "there is no camera");
   if (rig.camera_count() > kMostCameras)
     return malformed(origin, fmt::format("there are {} cameras, more than {}", rig.camera_count(), kMostCameras));
-  if (!rig.has_right() && !rig.more.empty()) return malformed(origin, "there are further cameras, but no second one");
-  for (int i = 2; i < rig.camera_count(); ++i) {
-    if (Result<void> good = check_camera(rig.camera(i), fmt::format("number {}", i), origin); !good) return good;
-    if (!is_transform(rig.T_BC(i))) return malformed(origin, fmt::format("the pose of camera {} is none", i));
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    const std::string side = i == 0 ? "left" : i == 1 ? "right" : fmt::format("number {}", i);
+    if (Result<void> good = check_camera(rig.camera(i), side, origin); !good) return good;
+    if (!is_transform(rig.T_BC(i)))
+      return malformed(origin, "a camera's pose in the body has a number that is not finite, or no rotation");
   }
-  if (!is_transform(rig.T_BC0) || !is_transform(rig.T_BC1))
-    return malformed(origin, "a camera's pose in the body has a number that is not finite, or no rotation");
   const double baseline_m = rig.T_C1C0().p.norm();
   if (rig.has_right() && !(baseline_m > 1e-3 && baseline_m < 10.0))
     return malformed(origin, fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));

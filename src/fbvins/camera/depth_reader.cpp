@@ -153,8 +153,8 @@ std::optional<MeasuredInverseDepth> measure(const RayElsewhere& ray, const Depth
 }  // namespace
 
 DepthReader::DepthReader(const StereoRig& rig)
-    : sensor_(*rig.depth), left_(rig.left), width_(rig.depth_camera().width()), height_(rig.depth_camera().height()) {
-  if (sensor_.own) T_EC_ = sensor_.own->T_BC.inverse() * rig.T_BC0;
+    : sensor_(*rig.depth), left_(rig.left()), width_(rig.depth_camera().width()), height_(rig.depth_camera().height()) {
+  if (sensor_.own) T_EC_ = sensor_.own->T_BC.inverse() * rig.T_BC0();
 }
 
 std::optional<MeasuredInverseDepth> DepthReader::at(const DepthImage& image, const Vec2& px) const {

@@ -28,14 +28,17 @@ DepthImage image_of(const std::function<double(double x, double y)>& depth_m) {
 }
 
 StereoRig rig() {
-  StereoRig out;
-  out.left = camera();
-  return with_depth(out, {.noise_at_1m_m = kNoise_m, .nearest_m = 0.3, .farthest_m = 6});
+  return with_depth(with_cameras({}, {{camera(), {}}}), {.noise_at_1m_m = kNoise_m, .nearest_m = 0.3, .farthest_m = 6});
 }
 
 const DepthReader& reader() {
   static const DepthReader reader(rig());
   return reader;
+}
+
+TEST(DepthReader, DepthsAreObservedFarToTheRightOfTheLeftCamera) {
+  const Pose<B, C0> T_BC0(so3_exp(Vec3(0.4, -0.3, 0.2)), Vec3(0.1, 0.2, 0.3));
+  EXPECT_LT((T_BC0.inverse() * depth_observer(T_BC0).p - Vec3(kDepthBaseline_m, 0, 0)).norm(), 1e-12);
 }
 
 /// A wall that is turned by 60 degrees.
@@ -94,9 +97,9 @@ TEST(DepthReader, TakesImagesOfTheCamerasSizeOnly) {
 /// A sensor of another size, lens and place: 60 mm to the right, turned by a few degrees.
 StereoRig apart() {
   StereoRig out = rig();
-  out.T_BC0 = {so3_exp(Vec3(0.4, -0.3, 0.2)), Vec3(0.1, 0.2, 0.3)};
+  out.cameras[0].T_BC = {so3_exp(Vec3(0.4, -0.3, 0.2)), Vec3(0.1, 0.2, 0.3)};
   const Camera own(PinholeRadtan{.fx = 90, .fy = 92, .cx = 49, .cy = 41, .k1 = -0.1, .k2 = 0.02}, 100, 80);
-  out.depth->own = MountedCamera{own, out.T_BC0 * Pose<C0, C0>(so3_exp(Vec3(0.03, -0.05, 0.04)), Vec3(0.06, 0.01, -0.005))};
+  out.depth->own = MountedCamera{own, out.T_BC0() * Pose<C0, C0>(so3_exp(Vec3(0.03, -0.05, 0.04)), Vec3(0.06, 0.01, -0.005))};
   return out;
 }
 
@@ -110,7 +113,7 @@ double met(const Vec3& p, const Vec3& d) {
 
 DepthImage seen_apart(const StereoRig& rig, const std::function<double(double)>& noisy) {
   const auto& [own, T_BE] = *rig.depth->own;
-  const Pose<C0, C0> T_CE = rig.T_BC0.inverse() * T_BE;
+  const Pose<C0, C0> T_CE = rig.T_BC0().inverse() * T_BE;
   DepthImage image{own.width(), own.height(), {}};
   for (int y = 0; y < own.height(); ++y)
     for (int x = 0; x < own.width(); ++x)
@@ -143,10 +146,10 @@ TEST(DepthReader, OfASensorThatLiesElsewhereTheDepthIsAlongTheCamerasOwnZ) {
 
 TEST(DepthReader, NothingWhereSomethingNearerHidesFromTheSensorWhatTheCameraSees) {
   StereoRig rig = apart();
-  rig.depth->own->T_BC = rig.T_BC0 * Pose<C0, C0>(Quat::Identity(), Vec3(0.25, 0, 0));
+  rig.depth->own->T_BC = rig.T_BC0() * Pose<C0, C0>(Quat::Identity(), Vec3(0.25, 0, 0));
   const DepthReader reader(rig);
   const DepthImage image = seen_apart(rig, [](double z) { return z; });
-  const Pose<C0, C0> T_EC = rig.depth->own->T_BC.inverse() * rig.T_BC0;
+  const Pose<C0, C0> T_EC = rig.depth->own->T_BC.inverse() * rig.T_BC0();
   int hidden = 0;
   for (double y = 14; y < 34; ++y)
     for (double x = 4; x < kWidth - 4; ++x) {

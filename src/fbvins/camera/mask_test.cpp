@@ -124,13 +124,13 @@ TEST(Mask, ACameraDoesNotSeeWhatIsHidden) {
 
 TEST(Mask, ARigIsRefusedWhoseMaskIsWrong) {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{450, 450, 376, 240, 0, 0, 0, 0}, 752, 480);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
-  rig.right.set_mask(std::make_shared<const Mask>(mask_of(752, 480, {0, 0, 752, 470})));
+  rig.cameras.assign(2, {Camera(PinholeRadtan{450, 450, 376, 240, 0, 0, 0, 0}, 752, 480), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
+  rig.cameras[1].camera.set_mask(std::make_shared<const Mask>(mask_of(752, 480, {0, 0, 752, 470})));
   EXPECT_TRUE(check_rig(rig, "rig").ok());
-  rig.right.set_mask(std::make_shared<const Mask>(mask_of(752, 480, {0, 0, 752, 480})));
+  rig.cameras[1].camera.set_mask(std::make_shared<const Mask>(mask_of(752, 480, {0, 0, 752, 480})));
   EXPECT_EQ(check_rig(rig, "rig").error().message, "rig: the right camera's mask hides all of the image");
-  rig.right.set_mask(std::make_shared<const Mask>(mask_of(640, 480, {0, 0, 10, 10})));
+  rig.cameras[1].camera.set_mask(std::make_shared<const Mask>(mask_of(640, 480, {0, 0, 10, 10})));
   EXPECT_EQ(check_rig(rig, "rig").error().message, "rig: the right camera's mask has 640 x 480 pixels, its images 752 x 480");
 }
 

@@ -164,12 +164,10 @@ std::shared_ptr<const Image> VirtualPinholes::part(const std::shared_ptr<const I
 
 StereoFrame VirtualPinholes::spread(StereoFrame frame) const {
   if (!any()) return frame;
-  StereoFrame out{frame.t, part(frame.left, 0), nullptr};
+  StereoFrame out{frame.t};
   out.after_clock_step = frame.after_clock_step;
   for (int i = 0; i < rig_.camera_count(); ++i) {
-    const std::shared_ptr<const Image> image = i == 0 ? nullptr : part(frame.image(lens_of(i)), i);
-    if (i == 1) out.right = image;
-    if (i > 1) out.more.push_back(image);
+    out.images.push_back(part(frame.image(lens_of(i)), i));
     out.offsets.set(i, frame.offsets.of(lens_of(i)));
   }
   return out;
@@ -182,15 +180,14 @@ TrackedFrame VirtualPinholes::gathered(TrackedFrame frame) const {
     for (std::int8_t* camera : {&feature.cameras.left, &feature.cameras.right})
       *camera = static_cast<std::int8_t>(lens_of(*camera));
   }
-  frame.has_right = frame.has_right && lenses_.has_right();
-  frame.has_more.resize(std::min(frame.has_more.size(), lenses_.more.size()));
+  frame.cameras.resize(std::min(frame.cameras.size(), lenses_.cameras.size()));
   return frame;
 }
 
 Calibration VirtualPinholes::of_lenses(Calibration calibration) const {
   if (!any()) return calibration;
-  if (!lenses_.has_right()) calibration.T_BC1 = lenses_.T_BC1;
-  calibration.more.resize(lenses_.more.size());
+  calibration.cameras.resize(std::max<std::size_t>(2, lenses_.cameras.size()));
+  if (!lenses_.has_right()) calibration.cameras[1] = lenses_.T_BC0();
   return calibration;
 }
 

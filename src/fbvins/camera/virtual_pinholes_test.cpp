@@ -20,10 +20,11 @@ std::vector<Camera> wide_lenses() {
 
 StereoRig rig_of(const Camera& left, const Camera& right) {
   StereoRig rig;
-  rig.left = left;
-  rig.right = right;
-  rig.T_BC0 = Pose<B, C0>(Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.1, 0, 0));
-  rig.T_BC1 = Pose<B, C1>(Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.1, -0.11, 0));
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = left;
+  rig.cameras[1].camera = right;
+  rig.cameras[0].T_BC = Pose<B, C0>(Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.1, 0, 0));
+  rig.cameras[1].T_BC = Pose<B, C0>(Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.1, -0.11, 0));
   return rig;
 }
 
@@ -132,7 +133,7 @@ TEST(VirtualPinholes, KeepTheNumbersOfTheRigsCameras) {
   EXPECT_EQ(faces.lens_of(0), 0);
   EXPECT_EQ(faces.lens_of(1), 1);
   for (int i = 2; i < 5; ++i) EXPECT_EQ(faces.lens_of(i), 0);
-  EXPECT_EQ(faces.rig().T_BC1.p, mixed.T_BC1.p);
+  EXPECT_EQ(faces.rig().T_BC1().p, mixed.T_BC1().p);
   EXPECT_EQ(faces.lenses_of(0b00010), 0b10);
   EXPECT_EQ(faces.lenses_of(0b01000), 0b01);
   EXPECT_EQ(VirtualPinholes(both).rig().camera_count(), 8);
@@ -142,7 +143,7 @@ TEST(VirtualPinholes, KeepTheNumbersOfTheRigsCameras) {
   for (int y = 0; y < 512; ++y)
     for (int x = 0; x < 512; ++x) picture->at(x, y) = static_cast<std::uint8_t>(3 * x + 7 * y);
   const std::shared_ptr<const Image> left = picture, right = std::make_shared<const Image>(752, 480);
-  StereoFrame frame{Time{5}, left, right};
+  StereoFrame frame{Time{5}, {left, right}};
   frame.offsets.set(0, Duration{7});
   const StereoFrame spread = faces.spread(frame);
   EXPECT_EQ(spread.image(1), right);
@@ -156,10 +157,10 @@ TEST(VirtualPinholes, KeepTheNumbersOfTheRigsCameras) {
     EXPECT_EQ(spread.offsets.of(i), Duration{7});
     // A direction of the face has the pixel of the lens.
     const Vec3 p = Vec3(0.1, -0.2, 1);
-    const Vec3 in_lens = mixed.T_BC0.q.conjugate() * (faces.rig().T_BC(i).q * p);
+    const Vec3 in_lens = mixed.T_BC0().q.conjugate() * (faces.rig().T_BC(i).q * p);
     EXPECT_LT((*face.project(p) + faces.origin_px(i) - *wide.pixel_of(in_lens)).norm(), 1e-8);
   }
-  frame.left = nullptr;
+  frame.set_image(0, nullptr);
   EXPECT_EQ(faces.spread(frame).image(3), nullptr);
 }
 
@@ -178,13 +179,11 @@ TEST(VirtualPinholes, OneLensIsSeveralCameras) {
   frame.features.resize(2);
   frame.features[1].cameras = {3, 3};
   frame.features[1].left.emplace().pixel = Vec2(2, 3);
-  frame.has_left = frame.has_right = true;
-  frame.has_more = {true, true};
+  frame.cameras = {true, true, true, true};
   const TrackedFrame gathered = faces.gathered(frame);
   EXPECT_EQ(gathered.features[1].cameras.left, 0);
   EXPECT_EQ(gathered.features[1].left->pixel, faces.origin_px(3) + Vec2(2, 3));
-  EXPECT_FALSE(gathered.has_right);
-  EXPECT_TRUE(gathered.has_more.empty());
+  EXPECT_EQ(gathered.cameras, std::vector<bool>{true});
 }
 
 }  // namespace virtual_pinholes_test

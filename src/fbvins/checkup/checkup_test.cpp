@@ -35,8 +35,8 @@ std::vector<Time> stamps() {
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{.fx = 300, .fy = 300, .cx = 240, .cy = 160}, 480, 320);
-  rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(0.12, 0, 0));
+  rig.cameras.assign(2, {Camera(PinholeRadtan{.fx = 300, .fy = 300, .cx = 240, .cy = 160}, 480, 320), {}});
+  rig.cameras[1].T_BC = Pose<B, C0>(Quat::Identity(), Vec3(0.12, 0, 0));
   return rig;
 }
 
@@ -47,7 +47,7 @@ StereoFrame wall(Time t) {
     return std::make_shared<const Image>(render_texture(
         480, 320, texture, [&](const Vec2& px) { return Vec2(px.x() + shift_px, px.y()); }, 120, 35, 1.0, seed));
   };
-  return {t, image(0, 1), image(300 * 0.12 / 2, 2)};
+  return {t, {image(0, 1), image(300 * 0.12 / 2, 2)}};
 }
 
 bool says(const std::vector<Finding>& findings, FindingKind kind) {
@@ -278,7 +278,7 @@ TEST(Checkup, MeasuresTheNoiseThatIsDeclared) {
 TEST(Checkup, SeesLeftAndRightExchanged) {
   StereoFrame frame = wall(Time{1});
   EXPECT_FALSE(stereo_order(rig(), std::span(&frame, 1)).swapped());
-  std::swap(frame.left, frame.right);
+  frame.swap_left_right();
   const StereoOrder order = stereo_order(rig(), std::span(&frame, 1));
   EXPECT_TRUE(order.swapped()) << order.as_named << " " << order.as_swapped << " of " << order.features;
   EXPECT_TRUE(check_stereo_order(order));
@@ -297,13 +297,13 @@ TEST(Checkup, SeesAProjectorThatIsOn) {
   for (const Time t : {Time{1'000'000'000}, Time{3'000'000'000}, Time{5'000'000'000}}) {
     StereoFrame frame = wall(t);
     plain.push(frame);
-    auto left = std::make_shared<Image>(*frame.left);
+    auto left = std::make_shared<Image>(*frame.left());
     for (const Vec2& spot : spots)
       for (int y = 0; y < left->height(); ++y)
         for (int x = 0; x < left->width(); ++x)
           if (const double far = (Vec2(x, y) - spot).squaredNorm(); far < 16)
             left->at(x, y) = static_cast<std::uint8_t>(std::min(255.0, left->at(x, y) + 110 * std::exp(-0.5 * far)));
-    frame.left = left;
+    frame.set_image(0, left);
     lit.push(frame);
   }
   EXPECT_FALSE(says(plain.findings(), FindingKind::projector_dots));

@@ -39,8 +39,8 @@ double share_of_dots(const Camera& camera, std::span<const StereoFrame> frames) 
   double least = 1;
   int judged = 0;
   for (const StereoFrame& frame : frames) {
-    if (!frame.left || frame.left->width() != camera.width() || frame.left->height() != camera.height()) continue;
-    left.build(frame.left->view(), kLevels);
+    if (!frame.left() || frame.left()->width() != camera.width() || frame.left()->height() != camera.height()) continue;
+    left.build(frame.left()->view(), kLevels);
     const std::vector<Corner>& corners = detector.detect(left, {}, kCorners, camera.mask().get());
     if (static_cast<int>(corners.size()) < kFewestCorners) continue;
     const auto dots =

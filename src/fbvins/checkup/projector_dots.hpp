@@ -2,7 +2,7 @@
 // Whether an infrared projector is on: its spots move with the camera, and features on them say that it does not move. Pure
 // functions, any thread.
 //
-//   if (auto finding = check_dots(share_of_dots(rig.left, frames))) report(*finding);
+//   if (auto finding = check_dots(share_of_dots(rig.left(), frames))) report(*finding);
 #pragma once
 
 #include <optional>

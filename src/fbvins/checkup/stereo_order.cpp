@@ -40,14 +40,15 @@ StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> fram
   Pyramid left, right;
   StereoOrder order;
   for (const StereoFrame& frame : frames) {
-    if (!frame.left || !frame.right || frame.left->width() != rig.left.width() || frame.right->width() != rig.right.width())
+    if (!frame.left() || !frame.right() || frame.left()->width() != rig.left().width() ||
+        frame.right()->width() != rig.right().width())
       continue;
-    left.build(frame.left->view(), kKltLevels);
-    right.build(frame.right->view(), kKltLevels);
-    const std::vector<Corner>& corners = detector.detect(left, {}, kMostCorners, rig.left.mask().get());
+    left.build(frame.left()->view(), kKltLevels);
+    right.build(frame.right()->view(), kKltLevels);
+    const std::vector<Corner>& corners = detector.detect(left, {}, kMostCorners, rig.left().mask().get());
     order.features += static_cast<int>(corners.size());
-    order.as_named += matches(as_named, rig.left, left, right, corners);
-    order.as_swapped += matches(as_swapped, other.left, left, right, corners);
+    order.as_named += matches(as_named, rig.left(), left, right, corners);
+    order.as_swapped += matches(as_swapped, other.left(), left, right, corners);
   }
   return order;
 }

@@ -3,7 +3,7 @@
 // cameras exchanged. Pure functions, any thread.
 //
 //   StereoOrder order = stereo_order(rig, frames);
-//   if (order.swapped()) std::swap(frame.left, frame.right);
+//   if (order.swapped()) frame.swap_left_right();
 #pragma once
 
 #include <optional>

@@ -70,8 +70,8 @@ TEST(ConfigFile, AFlightRecordGivesTheFlightsConfiguration) {
   flown.frontend.kind = "orb";
   flown.estimator.accel_noise_scale = 1.0 / 3 + 16;
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-  rig.T_BC1.p.x() = 0.1;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24), {}});
+  rig.cameras[1].T_BC.p.x() = 0.1;
   ASSERT_TRUE(FlightRecord::create(path, rig, {.configuration = to_yaml(flown)}));
   const auto config = load_config(path);
   std::filesystem::remove(path);

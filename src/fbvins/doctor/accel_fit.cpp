@@ -238,7 +238,7 @@ AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries&
   for (const Window& w : windows)
     for (std::size_t k = w.first; k < w.last; ++k)
       deltas[k] = deltas_of(imu.segment(pairs[k].a + offset, pairs[k].b + offset), rig.imu_noise, start.gyro_bias_radps);
-  Summed sums = sum_up(windows, pairs, deltas, rig.T_BC0, 1);
+  Summed sums = sum_up(windows, pairs, deltas, rig.T_BC0(), 1);
   const Explained as_named = explained_by(Mat3::Identity(), sums.all);
   Explained best = as_named;
   for (const Mat3& axes : signed_permutations()) {
@@ -246,7 +246,8 @@ AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries&
     if (one.unexplained < best.unexplained) best = one, fit.axes = axes;
   }
   if (as_named.unexplained <= 2 * best.unexplained + kAxesLeave) best = as_named, fit.axes.setIdentity();
-  if (best.scale > 0) sums = sum_up(windows, pairs, deltas, rig.T_BC0, best.scale);  // the lever arm is in metres of the readings
+  if (best.scale > 0)
+    sums = sum_up(windows, pairs, deltas, rig.T_BC0(), best.scale);  // the lever arm is in metres of the readings
   best = explained_by(fit.axes, sums.all);
   fit.unexplained = best.unexplained;
   fit.unexplained_as_named = explained_by(Mat3::Identity(), sums.all).unexplained;

@@ -130,12 +130,12 @@ struct Samples {
 
 Samples collect(const Evidence& evidence, const ImuSeries& imu, const StereoRig& rig) {
   Samples out;
-  const auto flow = flows(rig.left);
+  const auto flow = flows(rig.left());
   const std::size_t n = evidence.frames.size(), step = n / kMostImages + 1;
   for (std::size_t k = 0; k < n; k += step) {
     const Time t = evidence.frames[k].t + Duration::from_seconds(rig.time_offset_s);
     if (!imu.covers(t - kHalf, t + kHalf)) continue;
-    const Vec3 rate_C = rig.T_BC0.R().transpose() * imu.turned(t - kHalf, t + kHalf) / (kHalf + kHalf).seconds();
+    const Vec3 rate_C = rig.T_BC0().R().transpose() * imu.turned(t - kHalf, t + kHalf) / (kHalf + kHalf).seconds();
     std::vector<double> speeds;
     for (int cell = 0; cell < Energies::kCells; ++cell) {
       if (!flow[static_cast<std::size_t>(cell)]) continue;

@@ -57,8 +57,8 @@ Image exposed(const Image& scene, int x0, int y0, const Vec2& way) {
 /// A camera that turns about another axis in every image. Its flow is nearly the same everywhere in the image.
 Blur measured(double exposure_s, double stretch, double most_degrees = 180) {
   Evidence evidence;
-  evidence.rig.left = evidence.rig.right =
-      Camera(PinholeRadtan{.fx = kFocal_px, .fy = kFocal_px, .cx = kWidth / 2.0, .cy = kHeight / 2.0}, kWidth, kHeight);
+  evidence.rig.cameras.assign(
+      2, {Camera(PinholeRadtan{.fx = kFocal_px, .fy = kFocal_px, .cx = kWidth / 2.0, .cy = kHeight / 2.0}, kWidth, kHeight), {}});
   const Image scene = discs(stretch);
   Rng rng(7);
   std::vector<ImuSample> readings;

@@ -101,14 +101,14 @@ bool is_of_right(CalibrationField field) {
 
 std::string line_of(CalibrationField field, const StereoRig& rig, CalibrationStyle style) {
   switch (field) {
-    case CalibrationField::mounting_of_left: return mounting_line(rig.T_BC0, true, style);
-    case CalibrationField::mounting_of_right: return mounting_line(rig.T_BC1, false, style);
-    case CalibrationField::size_of_left: return size_line(rig.left, true, style);
-    case CalibrationField::size_of_right: return size_line(rig.right, false, style);
-    case CalibrationField::lens_of_left: return intrinsics_line(rig.left, true, style);
-    case CalibrationField::lens_of_right: return intrinsics_line(rig.right, false, style);
-    case CalibrationField::distortion_of_left: return distortion_line(rig.left, true, style);
-    case CalibrationField::distortion_of_right: return distortion_line(rig.right, false, style);
+    case CalibrationField::mounting_of_left: return mounting_line(rig.T_BC0(), true, style);
+    case CalibrationField::mounting_of_right: return mounting_line(rig.T_BC1(), false, style);
+    case CalibrationField::size_of_left: return size_line(rig.left(), true, style);
+    case CalibrationField::size_of_right: return size_line(rig.right(), false, style);
+    case CalibrationField::lens_of_left: return intrinsics_line(rig.left(), true, style);
+    case CalibrationField::lens_of_right: return intrinsics_line(rig.right(), false, style);
+    case CalibrationField::distortion_of_left: return distortion_line(rig.left(), true, style);
+    case CalibrationField::distortion_of_right: return distortion_line(rig.right(), false, style);
     case CalibrationField::mask_of_left: return mask_line(true, style);
     case CalibrationField::mask_of_right: return mask_line(false, style);
     case CalibrationField::time_offset: return time_lines(rig, style);

@@ -46,7 +46,7 @@ bool same(const std::shared_ptr<const Image>& a, const std::shared_ptr<const Ima
 
 struct EvidenceCollector::State {
   explicit State(const StereoRig& rig)
-      : images(rig, kKltLevels), follower(rig.left), tracks(kFeatures), detector(kDistance_px), sampler(rig.has_right()) {
+      : images(rig, kKltLevels), follower(rig.left()), tracks(kFeatures), detector(kDistance_px), sampler(rig.has_right()) {
     evidence.rig = evidence.working_rig = rig;
     if (rig.depth) depths.emplace(rig);
   }
@@ -90,9 +90,9 @@ struct EvidenceCollector::State {
 
 void EvidenceCollector::State::count_repeated(const StereoFrame& frame) {
   ++evidence.repeated.frames;
-  evidence.repeated.left += same(frame.left, before.left);
-  evidence.repeated.right += same(frame.right, before.right);
-  evidence.repeated.same_pair += same(frame.left, frame.right);
+  evidence.repeated.left += same(frame.left(), before.left());
+  evidence.repeated.right += same(frame.right(), before.right());
+  evidence.repeated.same_pair += same(frame.left(), frame.right());
   before = frame;
 }
 
@@ -112,10 +112,10 @@ std::vector<StereoView> EvidenceCollector::State::views_of_few() {
   std::vector<StereoView> views;
   Pyramid left, right;
   for (const StereoFrame& frame : few_of(held)) {
-    if (!frame.left || !frame.right) continue;
-    left.build(frame.left->view(), kKltLevels);
-    right.build(frame.right->view(), kKltLevels);
-    views.push_back({frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, left, right)});
+    if (!frame.left() || !frame.right()) continue;
+    left.build(frame.left()->view(), kKltLevels);
+    right.build(frame.right()->view(), kKltLevels);
+    views.push_back({frame.t, free_stereo.match(evidence.rig, *frame.left(), *frame.right(), left, right)});
   }
   return views;
 }
@@ -136,7 +136,7 @@ void EvidenceCollector::State::put_in_order() {
   evidence.order = stereo_order(evidence.rig, few_of(held));
   evidence.swapped = evidence.order.swapped() && !as_named_after_all();
   if (evidence.swapped)
-    for (StereoFrame& frame : held) std::swap(frame.left, frame.right);
+    for (StereoFrame& frame : held) frame.swap_left_right();
   evidence.step = stereo_step(evidence.rig, held, free_stereo);
   realigner = StereoRealigner(evidence.step.lag);
   std::vector<StereoFrame> in_step;
@@ -180,7 +180,7 @@ void EvidenceCollector::State::look(StereoFrame frame) {
   }
   if (!images.right().empty() && (evidence.stereo.empty() || (frame.t - last_view).seconds() > kStereoStep_s - slack_s)) {
     evidence.stereo.push_back(
-        {frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, images.left(), images.right())});
+        {frame.t, free_stereo.match(evidence.rig, *frame.left(), *frame.right(), images.left(), images.right())});
     last_view = frame.t;
   }
   note(seen);
@@ -216,8 +216,8 @@ void EvidenceCollector::State::detect() {
   std::vector<Vec2> occupied;
   for (const KltTrack& track : tracks) occupied.push_back(track.px);
   for (const Corner& corner :
-       detector.detect(images.left(), occupied, kFeatures - static_cast<int>(tracks.size()), evidence.rig.left.mask().get())) {
-    const auto normalised = evidence.rig.left.undistort(corner.px);
+       detector.detect(images.left(), occupied, kFeatures - static_cast<int>(tracks.size()), evidence.rig.left().mask().get())) {
+    const auto normalised = evidence.rig.left().undistort(corner.px);
     if (!normalised || tracks.full()) continue;
     KltPatches& patches = tracks.free_patches();
     if (!patches.newest.cut(images.left(), corner.px, 0, kKltLevels - 1)) continue;
@@ -235,7 +235,7 @@ std::optional<double> EvidenceCollector::State::depth_of(const KltTrack& track, 
     const auto measured = depths->at(*frame.depth, track.px);
     return measured ? std::optional(measured->value) : std::nullopt;
   }
-  const auto ray = evidence.working_rig.left.undistort(track.px);
+  const auto ray = evidence.working_rig.left().undistort(track.px);
   if (!ray) return std::nullopt;
   const StereoMatch found =
       stereo->match(tracks.patches(track).newest, track.px, *ray, track.inverse_depth, images.left(), images.right());
@@ -276,7 +276,7 @@ bool EvidenceCollector::push_frame(StereoFrame frame) {
   s.evidence.untriggered = s.evidence.untriggered || frame.offsets.are_apart(0, 1);
   s.count_repeated(frame);
   if (!s.prelude) {
-    if (s.evidence.swapped) std::swap(frame.left, frame.right);
+    if (s.evidence.swapped) frame.swap_left_right();
     if (auto whole = s.realigner.push(std::move(frame))) s.look(std::move(*whole));
     return !s.enough();
   }

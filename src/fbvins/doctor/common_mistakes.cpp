@@ -37,14 +37,14 @@ Camera half_turned(const Camera& camera) {
 Mat3 half_turn() { return so3_exp(std::numbers::pi * Vec3::UnitZ()).toRotationMatrix(); }
 
 StereoRig with_mountings(StereoRig rig, const Pose<B, C0>& T_BC0, const Pose<B, C1>& T_BC1) {
-  rig.T_BC0 = T_BC0, rig.T_BC1 = T_BC1;
+  rig.cameras[0].T_BC = T_BC0, rig.cameras[1].T_BC = T_BC1.cast_frames<B, C0>();
   return rig;
 }
 
 void add_inverted(const StereoRig& rig, std::vector<CommonMistake>& all) {
-  const auto left = rig.T_BC0.inverse().cast_frames<B, C0>();
-  const auto right = rig.T_BC1.inverse().cast_frames<B, C1>();
-  const Pose<C0, C1> T_C0C1 = rig.T_BC0.inverse() * rig.T_BC1;
+  const auto left = rig.T_BC0().inverse().cast_frames<B, C0>();
+  const auto right = rig.T_BC1().inverse().cast_frames<B, C1>();
+  const Pose<C0, C1> T_C0C1 = rig.T_BC0().inverse() * rig.T_BC1();
   const auto add = [&](const char* what, const Pose<B, C0>& T_BC0, const Pose<B, C1>& T_BC1,
                        const std::vector<CalibrationField>& fields) {
     all.push_back(
@@ -55,30 +55,30 @@ void add_inverted(const StereoRig& rig, std::vector<CommonMistake>& all) {
   add("both cameras' transforms to the IMU inverted", left, right, kMountings);
   add("the left camera's transform to the IMU inverted, and the right camera where it is beside it", left, left * T_C0C1,
       kMountings);
-  add("the transform from camera to camera inverted", rig.T_BC0, rig.T_BC0 * T_C0C1.inverse().cast_frames<C0, C1>(),
+  add("the transform from camera to camera inverted", rig.T_BC0(), rig.T_BC0() * T_C0C1.inverse().cast_frames<C0, C1>(),
       {mounting_of_right});
-  add("the right camera's transform to the IMU inverted", rig.T_BC0, right, {mounting_of_right});
-  add("the left camera's transform to the IMU inverted", left, rig.T_BC1, {mounting_of_left});
+  add("the right camera's transform to the IMU inverted", rig.T_BC0(), right, {mounting_of_right});
+  add("the left camera's transform to the IMU inverted", left, rig.T_BC1(), {mounting_of_left});
 }
 
 void add_sizes(const StereoRig& rig, std::vector<CommonMistake>& all) {
   for (const auto& [factor, what] : {std::pair{2.0, "lenses of images of twice the calibration's size"},
                                      std::pair{0.5, "lenses of images of half the calibration's size"}}) {
     StereoRig other = rig;
-    other.left = with_scaled_lens(rig.left, factor), other.right = with_scaled_lens(rig.right, factor);
+    for (MountedCamera& mounted : other.cameras) mounted.camera = with_scaled_lens(mounted.camera, factor);
     all.push_back({FindingKind::calibration_size, what, "calibrate at the size that is used, or scale focal lengths and centres",
                    std::move(other), ImageFlip::none, kLenses});
   }
   StereoRig other = rig;
-  other.left = rig.left.with_lens(rig.right.model()), other.right = rig.right.with_lens(rig.left.model());
+  other.cameras[0].camera = rig.left().with_lens(rig.right().model());
+  other.cameras[1].camera = rig.right().with_lens(rig.left().model());
   all.push_back({FindingKind::swapped_images, "the two cameras' lenses exchanged", "exchange the lenses in the calibration",
                  std::move(other), ImageFlip::none, kAllOfLenses});
 }
 
 void add_images(const StereoRig& rig, std::vector<CommonMistake>& all) {
   StereoRig turned = rig;
-  turned.left = half_turned(rig.left), turned.right = half_turned(rig.right);
-  turned.T_BC0.q = rig.T_BC0.q * Quat(half_turn()), turned.T_BC1.q = rig.T_BC1.q * Quat(half_turn());
+  for (auto& [camera, T_BC] : turned.cameras) camera = half_turned(camera), T_BC.q = T_BC.q * Quat(half_turn());
   all.push_back({FindingKind::images_turned, "images that are upside down",
                  "deliver the images as they were calibrated, or take the lines below", std::move(turned), ImageFlip::none,
                  kAll});
@@ -107,7 +107,7 @@ double epipolar_error_px(const CommonMistake& mistake, const Evidence& evidence)
     for (StereoPoint point : view.points) {
       if (evidence.swapped) std::swap(point.left, point.right);
       seen.points.push_back(
-          {flipped(point.left, mistake.rig.left, mistake.flip), flipped(point.right, mistake.rig.right, mistake.flip)});
+          {flipped(point.left, mistake.rig.left(), mistake.flip), flipped(point.right, mistake.rig.right(), mistake.flip)});
     }
     errors.push_back(epipolar_error_px(seen, mistake.rig));
   }
@@ -197,7 +197,7 @@ bool may_be(const CommonMistake& mistake, const Evidence& evidence, const Diagno
                                             [](const Finding& f) { return f.kind == FindingKind::gyro_axes; });
   if (!axes_known) return true;
   // Images found exchanged were given to the other camera, with nearly the same axes.
-  const Mat3 away = as_given.rig.T_BC0.R().transpose() * mistake.rig.T_BC0.R() * mistake.seen_as;
+  const Mat3 away = as_given.rig.T_BC0().R().transpose() * mistake.rig.T_BC0().R() * mistake.seen_as;
   return so3_log(Quat(away)).norm() < kTurned;
 }
 

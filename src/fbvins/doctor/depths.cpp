@@ -6,14 +6,14 @@ namespace {
 
 /// Where the feature was matched in the right image, from the depth that the working rig gave it.
 std::optional<Vec2> right_px(const StereoRig& worked, const SeenFeature& feature) {
-  const auto ray = worked.left.undistort(feature.px);
+  const auto ray = worked.left().undistort(feature.px);
   if (!ray) return std::nullopt;
-  return worked.right.project(worked.T_C1C0() * Vec3(ray->homogeneous() / feature.inverse_depth));
+  return worked.right().project(worked.T_C1C0() * Vec3(ray->homogeneous() / feature.inverse_depth));
 }
 
 /// 0 where the rays do not meet in front of the cameras.
 double inverse_depth_by(const StereoRig& rig, const Vec2& left_px, const Vec2& right_px) {
-  const auto left = rig.left.undistort(left_px), right = rig.right.undistort(right_px);
+  const auto left = rig.left().undistort(left_px), right = rig.right().undistort(right_px);
   if (!left || !right) return 0;
   const Pose<C1, C0> T_C1C0 = rig.T_C1C0();
   // right x (z R left + p) = 0

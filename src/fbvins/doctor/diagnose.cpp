@@ -30,8 +30,7 @@ Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFl
   EvidenceCollector gatherer(rig);
   const Result<void> played = replay([&](SensorEvent event) {
     if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && flip != ImageFlip::none) {
-      frame->left = flipped(frame->left, flip);
-      frame->right = flipped(frame->right, flip);
+      for (auto& image : frame->images) image = flipped(image, flip);
     }
     return gatherer.push(event);
   });

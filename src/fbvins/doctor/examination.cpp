@@ -128,7 +128,7 @@ bool Examination::fixed_in_view(double share_of_features) {
   out_.masks = {fixed.masks[0], fixed.masks[1]};
   for (std::size_t i = 0; i < out_.masks.size(); ++i)
     if (out_.masks[i]) {
-      (i == 0 ? rig_.left : rig_.right).set_mask(out_.masks[i]);
+      rig_.cameras[i].camera.set_mask(out_.masks[i]);
       finding.fields.push_back(i == 0 ? CalibrationField::mask_of_left : CalibrationField::mask_of_right);
     }
   return true;

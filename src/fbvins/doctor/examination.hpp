@@ -72,6 +72,7 @@ class Examination {
   void right_images_late();
   void turns();
   void gyro_unit(const TurnFit& fit);
+  void turn_cameras(const Mat3& R_CB);
   void gyro_axes(const TurnFit& fit);
   bool accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const;
   void motion();

@@ -123,14 +123,14 @@ void Examination::accel_axes(const AccelFit& fit) {
 bool Examination::turned_with_imu(const AccelFit& fit) {
   const auto rotation = std::ranges::find(out_.findings, FindingKind::imu_camera_rotation, &Finding::kind);
   if (rotation == out_.findings.end()) return false;
-  const Mat3 turn = rig_.T_BC0.R() * evidence_.rig.T_BC0.R().transpose();
-  const Vec3 with_turn = turn * rig_.T_BC0.p - rig_.T_BC0.p;
+  const Mat3 turn = rig_.T_BC0().R() * evidence_.rig.T_BC0().R().transpose();
+  const Vec3 with_turn = turn * rig_.T_BC0().p - rig_.T_BC0().p;
   const auto sigmas_from = [&](const Vec3& place) {
     return (fit.lever_m - place).cwiseQuotient(fit.lever_sigma_m.cwiseMax(kLeverResolution_m)).norm();
   };
   if (sigmas_from(with_turn) + kTurnedTells > sigmas_from(Vec3::Zero())) return false;
   if ((fit.lever_m - with_turn).norm() > kPositionPractical_m) return false;
-  rig_.T_BC0.p += with_turn, rig_.T_BC1.p += with_turn;
+  for (MountedCamera& mounted : rig_.cameras) mounted.T_BC.p += with_turn;
   rotation->advice = "correct the cameras' poses on the IMU, their places with their rotation, or mount the IMU as calibrated";
   return true;
 }
@@ -140,7 +140,7 @@ bool Examination::position(const AccelFit& fit) {
   const double away_m = fit.lever_m.norm(), sigma_m = fit.lever_sigma_m.maxCoeff();
   if (away_m < kPositionPractical_m || away_m < kSignificant * sigma_m) return false;
   if (fit.unexplained_elsewhere > kElsewhereLeaves * fit.unexplained) return false;
-  rig_.T_BC0.p += fit.lever_m, rig_.T_BC1.p += fit.lever_m;
+  for (MountedCamera& mounted : rig_.cameras) mounted.T_BC.p += fit.lever_m;
   Finding& finding = found(FindingKind::imu_camera_position, 1e2 * away_m, 1e2 * sigma_m, "cm");
   finding.measured = fmt::format(
       "the cameras are ({:.1f}, {:.1f}, {:.1f}) +- {:.1f} cm, in the IMU's axes, from where the calibration has them on the IMU",
@@ -208,7 +208,7 @@ void Examination::baseline_length(double factor, double sigma) {
       "correct the right camera's position (the calibration board's squares were given a wrong size, or the camera was moved)";
   Pose<C1, C0> T_C1C0 = rig_.T_C1C0();
   T_C1C0.p *= factor;
-  rig_.T_BC1 = rig_.T_BC0 * T_C1C0.inverse();
+  rig_.cameras[1].T_BC = (rig_.T_BC0() * T_C1C0.inverse()).cast_frames<B, C0>();
   finding.fields = {CalibrationField::mounting_of_right};
 }
 

@@ -56,7 +56,7 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
     finding.measured = fmt::format("the {} principal point lies ({:.1f} +- {:.1f}, {:.1f} +- {:.1f}) px from the calibration's",
                                    camera, amount(0), sigma(0), amount(1), sigma(1));
   } else {
-    const RadialNames names = radial_names(which == WhichLens::right ? rig_.right : rig_.left);
+    const RadialNames names = radial_names(which == WhichLens::right ? rig_.right() : rig_.left());
     change.radial = amount;
     finding.size = amount(0), finding.sigma = sigma(0), finding.unit = fmt::format("of {}", names.first);
     finding.measured = fmt::format("the {} distortion is not the calibration's: {} {:+.3f} +- {:.3f}, {} {:+.3f} +- {:.3f}",
@@ -64,11 +64,11 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
   }
   const bool bent = kind == FindingKind::distortion;
   if (which != WhichLens::right) {
-    rig_.left = changed(rig_.left, change);
+    rig_.cameras[0].camera = changed(rig_.left(), change);
     finding.fields.push_back(bent ? CalibrationField::distortion_of_left : CalibrationField::lens_of_left);
   }
   if (which != WhichLens::left) {
-    rig_.right = changed(rig_.right, change);
+    rig_.cameras[1].camera = changed(rig_.right(), change);
     finding.fields.push_back(bent ? CalibrationField::distortion_of_right : CalibrationField::lens_of_right);
   }
   finding.expected = fmt::format("less than the accuracy of features; this explains {:.1f} px", explained_px);
@@ -141,7 +141,7 @@ void Examination::stereo_change(const StereoChange& change) {
     } else {
       T_C1C0.p = turned_baseline(T_C1C0.p, change.amount);
     }
-    rig_.T_BC1 = rig_.T_BC0 * T_C1C0.inverse();
+    rig_.cameras[1].T_BC = (rig_.T_BC0() * T_C1C0.inverse()).cast_frames<B, C0>();
     finding.fields = {CalibrationField::mounting_of_right};
   } else if (change.kind == FindingKind::stereo_sync) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");

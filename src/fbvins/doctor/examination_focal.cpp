@@ -37,7 +37,7 @@ std::optional<Doubt> doubt(const std::vector<StereoChange>& by_pair, const Motio
 }
 
 StereoRig with_focal(StereoRig rig, double log_focal) {
-  for (Camera* camera : {&rig.left, &rig.right}) *camera = changed(*camera, {.log_focal = log_focal});
+  for (MountedCamera& mounted : rig.cameras) mounted.camera = changed(mounted.camera, {.log_focal = log_focal});
   return rig;
 }
 

@@ -54,7 +54,7 @@ void Examination::force() {
     for (ImuSample& sample : samples) sample.accel_mps2 *= accel_unit_;
     imu_ = ImuSeries(samples);
   }
-  ForceProblem problem(windows_of(evidence_, imu_, rig_, offset_s_, gyro_bias_), rig_.T_BC0.p, rig_.left.focal_px());
+  ForceProblem problem(windows_of(evidence_, imu_, rig_, offset_s_, gyro_bias_), rig_.T_BC0().p, rig_.left().focal_px());
   problem.free = kBiasGroup.unknowns;
   problem.begin();
   std::optional<BlockSolution> last = problem.windows() < kFewestWindows ? std::nullopt : problem.converge();

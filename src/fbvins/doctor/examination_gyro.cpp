@@ -30,7 +30,7 @@ StereoRig with_lens_of(const MotionFit& fit, StereoRig rig) {
     if (change.kind == FindingKind::principal_point) lens.centre_px = change.amount;
     if (change.kind == FindingKind::distortion) lens.radial = change.amount;
   }
-  rig.left = changed(rig.left, lens);
+  rig.cameras[0].camera = changed(rig.left(), lens);
   return rig;
 }
 
@@ -53,14 +53,14 @@ MotionFit Examination::fit_with_gyro() const {
   if (!gyro) return given;
   MotionStart start{rig_, rig_.time_offset_s, false, true};
   const double line_off_s = gyro->line_delay_s - rig_.times(0).line_delay_s;
-  const double readout_s = line_off_s * rig_.left.height(), sigma_s = gyro->line_delay_sigma_s * rig_.left.height();
+  const double readout_s = line_off_s * rig_.left().height(), sigma_s = gyro->line_delay_sigma_s * rig_.left().height();
   const bool rolling = certainly(readout_s, sigma_s, kReadoutPractical_s);
   if (rolling) start.rig.line_delay_s += line_off_s;
   const bool late = certainly(gyro->offset_s - rig_.time_offset_s, gyro->offset_sigma_s, kTimePractical_s);
   if (late) start.offset_s = gyro->offset_s;
-  const double turned = angle_of(rig_.T_BC0.R() * gyro->R_CB);
+  const double turned = angle_of(rig_.T_BC0().R() * gyro->R_CB);
   const bool rotated = certainly(turned, gyro->rotation_sigma_rad.maxCoeff(), kRotationPractical_rad);
-  if (rotated) start.rig.T_BC0 = {Mat3(gyro->R_CB.transpose()), rig_.T_BC0.p};
+  if (rotated) start.rig.cameras[0].T_BC = {Mat3(gyro->R_CB.transpose()), rig_.T_BC0().p};
   MotionFit fit = fit_motion(pairs_, imu_, start);
   fit.offset_s = gyro->offset_s, fit.R_CB = gyro->R_CB;
   fit.offset_sigma_s = gyro->offset_sigma_s, fit.rotation_sigma_rad = gyro->rotation_sigma_rad;
@@ -73,7 +73,7 @@ MotionFit Examination::fit_with_gyro() const {
 /// The time offset in the first third of the recording against that in the last one.
 bool Examination::drift(const MotionFit& fit) {
   StereoRig rig = rig_;
-  rig.T_BC0 = {Mat3(fit.R_CB.transpose()), rig.T_BC0.p};
+  rig.cameras[0].T_BC = {Mat3(fit.R_CB.transpose()), rig.T_BC0().p};
   const auto part = [&](std::size_t begin, std::size_t end) -> std::optional<GyroFit> {
     const std::vector<FramePair> pairs(pairs_.begin() + static_cast<std::ptrdiff_t>(begin),
                                        pairs_.begin() + static_cast<std::ptrdiff_t>(end));

@@ -129,28 +129,34 @@ void Examination::gyro_unit(const TurnFit& fit) {
 bool Examination::accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const {
   if (!has_depths()) return gravity_turns_off(imu_) <= gravity_turns_off(imu_.with_gyro(axes));
   StereoRig turned = rig_;
-  turned.T_BC0 = {Mat3(R_CB.transpose()), rig_.T_BC0.p};
+  turned.cameras[0].T_BC = {Mat3(R_CB.transpose()), rig_.T_BC0().p};
   const AccelFit as_mounted = fit_accelerations(pairs_, imu_, turned, {fit.offset_s, Vec3::Zero()});
   const AccelFit as_named = fit_accelerations(pairs_, imu_.with_gyro(axes), rig_, {fit.offset_s, Vec3::Zero()});
   return as_mounted.unexplained_as_named <= as_named.unexplained_as_named;
 }
 
+/// The left one where it is, the right one with it.
+void Examination::turn_cameras(const Mat3& R_CB) {
+  const StereoRig before = rig_;
+  rig_.cameras[0].T_BC = {Mat3(R_CB.transpose()), before.T_BC0().p};
+  for (int i = 1; i < rig_.camera_count(); ++i)
+    rig_.cameras[static_cast<std::size_t>(i)].T_BC = rig_.T_BC0() * (before.T_BC0().inverse() * before.T_BC(i));
+}
+
 void Examination::gyro_axes(const TurnFit& fit) {
-  const Mat3 R_CB_calibrated = rig_.T_BC0.R().transpose();
+  const Mat3 R_CB_calibrated = rig_.T_BC0().R().transpose();
   const Mat3 N = R_CB_calibrated.transpose() * fit.R_CB;  // of readings, in the body's axes as calibrated
   const Mat3 P = nearest_axes(N);
   const double rest = angle_of(N * P.transpose());
   const bool right_way = P == Mat3::Identity();
   if (right_way && !fit.mirrored) {
     // A smaller rotation is left to the motion fit, which is more precise and starts at the calibration.
-    if (rest > 0.35) rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
+    if (rest > 0.35) rig_.cameras[0].T_BC = {Mat3(fit.R_CB.transpose()), rig_.T_BC0().p};
     return;
   }
   const bool mounted = !fit.mirrored && (rest > 0.17 || accelerometer_turned_too(P, fit.R_CB, fit));
   if (mounted) {
-    const auto T_C0C1 = rig_.T_BC0.inverse() * rig_.T_BC1;
-    rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
-    rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
+    turn_cameras(fit.R_CB);
     return;  // the motion fit tells by how much
   }
   Finding& finding =
@@ -174,7 +180,7 @@ void Examination::motion() {
   motion_agrees_ = true;
   measured(fmt::format(
       "time offset {:.2f} +- {:.2f} ms; rotation from the calibration's {:.2f} deg (+- {:.2f}); error of a predicted feature {:.2f} px, after the changes {:.2f}",
-      1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegreesPerRad * angle_of(evidence_.rig.T_BC0.R() * fit.R_CB),
+      1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegreesPerRad * angle_of(evidence_.rig.T_BC0().R() * fit.R_CB),
       kDegreesPerRad * fit.rotation_sigma_rad.maxCoeff(), fit.error_px, fit.remaining_px));
   for (const MotionChange& change : fit.changes)
     measured(fmt::format("  motion: {} {} +- {} explains {:.2f} px", to_string(change.kind), change.amount.norm(),
@@ -221,13 +227,13 @@ void Examination::motion_change(const MotionChange& change) {
         "calibrate scale and axes of the IMU (fbvins calibrate --imu-axes), or give the matrices of its calibration (Kalibr's A, OpenVINS' Tg)";
   } else if (change.kind == FindingKind::rolling_shutter) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
-    const double calibrated_ms = 1e3 * rig_.times(0).line_delay_s * rig_.left.height();
+    const double calibrated_ms = 1e3 * rig_.times(0).line_delay_s * rig_.left().height();
     finding.measured = fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first",
                                    calibrated_ms + finding.size, finding.sigma);
     finding.expected = calibrated_ms == 0 ? "0, as the calibration has no line delay"
                                           : fmt::format("{:.1f} ms by the calibration", calibrated_ms);
     finding.advice = "put the line delay into the calibration";
-    rig_.line_delay_s += change.amount(0) / rig_.left.height();
+    rig_.line_delay_s += change.amount(0) / rig_.left().height();
     finding.fields = {CalibrationField::line_delay};
   } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
              change.kind == FindingKind::distortion) {
@@ -274,12 +280,10 @@ void Examination::time_offset(const MotionFit& fit) {
 }
 
 void Examination::rotation(const MotionFit& fit) {
-  const Mat3 wrong = evidence_.rig.T_BC0.R() * fit.R_CB;
+  const Mat3 wrong = evidence_.rig.T_BC0().R() * fit.R_CB;
   const double sigma = fit.rotation_sigma_rad.maxCoeff(), angle = angle_of(wrong);
   if (!certainly(angle, sigma, kRotationPractical_rad)) return;
-  const auto T_C0C1 = rig_.T_BC0.inverse() * rig_.T_BC1;
-  rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
-  rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
+  turn_cameras(fit.R_CB);
   const Vec3 axis = so3_log(Quat(wrong)).normalized();
   Finding& finding = found(FindingKind::imu_camera_rotation, kDegreesPerRad * angle, kDegreesPerRad * sigma, "deg");
   finding.measured =

@@ -115,15 +115,15 @@ FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
     } else {
       moved_px.setZero();
     }
-    out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left.focal_px() * (turned_rad.norm() - by_bias_rad) > kAcross_px;
+    out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left().focal_px() * (turned_rad.norm() - by_bias_rad) > kAcross_px;
     for (int side = 0; side < cameras; ++side)
       fixed[static_cast<std::size_t>(side)].add({side == 0 ? views[i]->left : views[i]->right, moved_px.cast<float>(),
                                                  Vec3(evidence.rig.T_BC(side).q.conjugate() * turned_rad).cast<float>(),
                                                  by_bias_rad});
   }
   if (!out.judged()) return out;
-  judge(out, 0, fixed[0], evidence.rig.left);
-  if (cameras == 2) judge(out, 1, fixed[1], evidence.rig.right);
+  judge(out, 0, fixed[0], evidence.rig.left());
+  if (cameras == 2) judge(out, 1, fixed[1], evidence.rig.right());
   return out;
 }
 

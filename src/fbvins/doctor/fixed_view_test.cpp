@@ -18,8 +18,8 @@ constexpr double kFocal_px = 250, kApart_s = 0.5;
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{kFocal_px, kFocal_px, 160, 120, 0, 0, 0, 0}, kWidth, kHeight);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{kFocal_px, kFocal_px, 160, 120, 0, 0, 0, 0}, kWidth, kHeight), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   return rig;
 }
 
@@ -144,7 +144,7 @@ TEST(FixedView, WhatIsMaskedAlreadyIsNotFoundAgain) {
   Evidence seen = with_bar();
   Image drawn(kWidth, kHeight, 255);
   hide(drawn, kBar);
-  seen.rig.left.set_mask(std::make_shared<const Mask>(drawn));
+  seen.rig.cameras[0].camera.set_mask(std::make_shared<const Mask>(drawn));
   const FixedInView fixed = find_fixed(seen, ImuSeries(seen.imu));
   EXPECT_EQ(fixed.masks[0], nullptr);
   EXPECT_NE(fixed.masks[1], nullptr);

@@ -96,8 +96,8 @@ std::vector<Window> windows_of(const Evidence& evidence, const ImuSeries& imu, c
                                const Vec3& gyro_bias) {
   std::vector<Window> windows;
   const Duration offset = Duration::from_seconds(offset_s), margin = Duration::from_seconds(kMargin_s);
-  const Mat3 R_BC = rig.T_BC0.R();
-  const double line_s = rig.times(0).line_delay_s, middle = 0.5 * rig.left.height();
+  const Mat3 R_BC = rig.T_BC0().R();
+  const double line_s = rig.times(0).line_delay_s, middle = 0.5 * rig.left().height();
   for (std::size_t first = 0; first < evidence.frames.size();) {
     const Time from = evidence.frames[first].t;
     std::size_t last = first;
@@ -112,7 +112,7 @@ std::vector<Window> windows_of(const Evidence& evidence, const ImuSeries& imu, c
         if ((frame.t - before).seconds() < kStep_s) continue;
         before = frame.t;
         for (const SeenFeature& feature : frame.features) {
-          const auto ray = rig.left.undistort(feature.px);
+          const auto ray = rig.left().undistort(feature.px);
           if (!ray) continue;
           Sight sight = motion.at(frame.t + offset + Duration::from_seconds(line_s * (feature.px.y() - middle)));
           sight.ray_B = R_BC * ray->homogeneous().normalized();

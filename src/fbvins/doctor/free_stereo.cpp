@@ -23,8 +23,8 @@ FreeStereo::FreeStereo() : extractor_(kOrb), rng_(1) {}
 
 std::vector<StereoPoint> FreeStereo::match(const StereoRig& rig, const Image& left_image, const Image& right_image,
                                            const Pyramid& left, const Pyramid& right) {
-  extractor_.extract(left_image.view(), left_, rig.left.mask().get());
-  extractor_.extract(right_image.view(), right_, rig.right.mask().get());
+  extractor_.extract(left_image.view(), left_, rig.left().mask().get());
+  extractor_.extract(right_image.view(), right_, rig.right().mask().get());
   std::vector<StereoPoint> points;
   std::vector<Vec2> a, b;
   KltTemplate patch, back;
@@ -36,12 +36,12 @@ std::vector<StereoPoint> FreeStereo::match(const StereoRig& rig, const Image& le
     if (!there.ok() || (there.px - to).norm() > kNear_px || !back.cut(right, there.px, 0, 0)) continue;
     const KltResult again = klt_align(back, left, from, 0, 0, kConvergedCheck_px);
     if (!again.ok() || (again.px - from).norm() > kBack_px) continue;
-    const auto ray_left = rig.left.undistort(from), ray_right = rig.right.undistort(there.px);
+    const auto ray_left = rig.left().undistort(from), ray_right = rig.right().undistort(there.px);
     if (!ray_left || !ray_right) continue;
     points.push_back({from, there.px});
     a.push_back(*ray_left), b.push_back(*ray_right);
   }
-  const EpipolarResult result = ransac_epipolar(a, b, std::nullopt, {.threshold = kLoose_px / rig.left.focal_px()}, rng_);
+  const EpipolarResult result = ransac_epipolar(a, b, std::nullopt, {.threshold = kLoose_px / rig.left().focal_px()}, rng_);
   std::vector<StereoPoint> kept;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (result.inlier[i] != 0) kept.push_back(points[i]);

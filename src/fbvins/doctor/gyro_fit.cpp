@@ -33,10 +33,11 @@ TrackedFrame tracked(const SeenFrame& seen, const Camera& camera) {
 std::optional<GyroFit> fit_gyro(std::span<const SeenFrame> frames, const ImuSeries& imu, const StereoRig& rig, double offset_s) {
   const Duration offset = Duration::from_seconds(offset_s);
   const double line_delay_s = rig.times(0).line_delay_s;
-  GyroAlignment alignment(rig.T_BC0.R(), 0.5 * rig.left.height(), line_delay_s, kPrior, std::numeric_limits<std::size_t>::max());
+  GyroAlignment alignment(rig.T_BC0().R(), 0.5 * rig.left().height(), line_delay_s, kPrior,
+                          std::numeric_limits<std::size_t>::max());
   std::optional<Time> before;
   for (const SeenFrame& seen : frames) {
-    TrackedFrame frame = tracked(seen, rig.left);
+    TrackedFrame frame = tracked(seen, rig.left());
     if (before && imu.covers(*before + offset, seen.t + offset)) frame.imu = imu.segment(*before + offset, seen.t + offset);
     alignment.add(frame, offset);
     before = seen.t;
@@ -47,7 +48,7 @@ std::optional<GyroFit> fit_gyro(std::span<const SeenFrame> frames, const ImuSeri
                  found->time_offset_sigma_s(),
                  line_delay_s + found->line_delay_s(),
                  found->line_delay_sigma_s(),
-                 (so3_exp(found->rotation_rad()).toRotationMatrix() * rig.T_BC0.R()).transpose(),
+                 (so3_exp(found->rotation_rad()).toRotationMatrix() * rig.T_BC0().R()).transpose(),
                  found->covariance.diagonal().tail<3>().cwiseSqrt()};
 }
 

@@ -19,13 +19,13 @@ TEST(GyroFit, FindsOffsetLineDelayAndMountingTogether) {
   const Evidence evidence = test::SyntheticEvidence({.late_s = 0.03, .rolling_s = 0.02}).make();
   StereoRig rig = evidence.rig;
   const Vec3 turned(0.05, -0.03, 0.04);
-  rig.T_BC0 = {Mat3(so3_exp(turned).toRotationMatrix() * rig.T_BC0.R()), rig.T_BC0.p};
+  rig.cameras[0].T_BC = {Mat3(so3_exp(turned).toRotationMatrix() * rig.T_BC0().R()), rig.T_BC0().p};
   const auto found = fit(evidence, rig, 0.01);  // as far as rotations say
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->offset_s, 0.03, 0.001);
   EXPECT_LT(std::abs(found->offset_s - 0.03), 4 * found->offset_sigma_s);
   EXPECT_NEAR(found->line_delay_s, 0.02 / 480, 3e-6);
-  EXPECT_LT(so3_log(Quat(Mat3(found->R_CB * evidence.rig.T_BC0.R()))).norm(), 0.01);
+  EXPECT_LT(so3_log(Quat(Mat3(found->R_CB * evidence.rig.T_BC0().R()))).norm(), 0.01);
 }
 
 TEST(GyroFit, AGapCostsThePairsAroundIt) {

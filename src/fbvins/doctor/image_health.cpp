@@ -118,7 +118,7 @@ double share_of_dots(const Evidence& evidence) {
 FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu) {
   const Vec3 baseline = evidence.rig.has_right() ? evidence.rig.T_C1C0().p.normalized() : Vec3::Zero();
   const Vec2 across = Vec2(-baseline.y(), baseline.x()).normalized();
-  const double focal_px = evidence.rig.left.focal_px();
+  const double focal_px = evidence.rig.left().focal_px();
   std::map<std::int64_t, Stays> features;
   int pairs = 0;
   std::size_t a = 0;

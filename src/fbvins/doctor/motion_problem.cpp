@@ -22,15 +22,15 @@ using Eigen::VectorXd;
 namespace doctor::motion {
 
 Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
-    : camera(changed(start.rig.left, {x(kFocal), {x(kCentre), x(kCentre + 1)}, {x(kRadial), x(kRadial + 1)}})),
-      R_CB(start.rig.T_BC0.R().transpose() * so3_exp(Vec3(x.segment<3>(kRotation))).toRotationMatrix()),
+    : camera(changed(start.rig.left(), {x(kFocal), {x(kCentre), x(kCentre + 1)}, {x(kRadial), x(kRadial + 1)}})),
+      R_CB(start.rig.T_BC0().R().transpose() * so3_exp(Vec3(x.segment<3>(kRotation))).toRotationMatrix()),
       offset(Duration::from_seconds(start.offset_s + x(kTime))),
       bias(x.segment<3>(kBias)),
       scale((x.segment<3>(kAxis).array() + x(kScale)).exp().matrix()),
       by_force((Mat3() << x(kForce), x(kForce + 1), x(kForce + 2), x(kForce + 3), x(kForce + 4), x(kForce + 5), x(kForce + 6),
                 x(kForce + 7), x(kForce + 8))
                    .finished()),
-      rolling_s(start.rig.times(0).line_delay_s * start.rig.left.height() + x(kRolling)) {}
+      rolling_s(start.rig.times(0).line_delay_s * start.rig.left().height() + x(kRolling)) {}
 
 }  // namespace doctor::motion
 

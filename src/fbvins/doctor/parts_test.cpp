@@ -132,7 +132,7 @@ StereoFrame numbered(int number) {
   frame.t = Time{number};
   auto left = std::make_shared<Image>(1, 1), right = std::make_shared<Image>(1, 1);
   left->at(0, 0) = right->at(0, 0) = static_cast<std::uint8_t>(number);
-  frame.left = left, frame.right = right;
+  frame.set_image(0, left), frame.set_image(1, right);
   return frame;
 }
 
@@ -143,8 +143,8 @@ TEST(StereoStep, GivesEachLeftImageTheRightOneThatBelongsToIt) {
     for (int k = 10; k < 20; ++k)
       if (const auto frame = realigner.push(numbered(k))) {
         ++frames;
-        EXPECT_EQ(frame->t.ns, frame->left->at(0, 0));
-        EXPECT_EQ(frame->right->at(0, 0), frame->left->at(0, 0) + lag);
+        EXPECT_EQ(frame->t.ns, frame->left()->at(0, 0));
+        EXPECT_EQ(frame->right()->at(0, 0), frame->left()->at(0, 0) + lag);
       }
     EXPECT_EQ(frames, 10 - std::abs(lag));
   }
@@ -165,11 +165,11 @@ void compare_depths(const Evidence& a, const Evidence& b, Take&& take) {
 TEST(Depths, AreThoseOfTheNewCalibration) {
   const Evidence good = test::SyntheticEvidence({}).make();
   StereoRig longer = good.rig, turned = good.rig;
-  longer.T_BC1.p = longer.T_BC0.p + 1.2 * (longer.T_BC1.p - longer.T_BC0.p);
+  longer.cameras[1].T_BC.p = longer.T_BC0().p + 1.2 * (longer.T_BC1().p - longer.T_BC0().p);
   compare_depths(good, with_depths_by(longer, good),
                  [](const Vec2&, double before, double after) { EXPECT_NEAR(after, before / 1.2, 1e-6); });
-  turned.T_BC1 = {Mat3(turned.T_BC1.R() * so3_exp(Vec3(0, 0.01, 0)).toRotationMatrix()), turned.T_BC1.p};
-  const Vec2 centre(good.rig.left.width() / 2.0, good.rig.left.height() / 2.0);
+  turned.cameras[1].T_BC = {Mat3(turned.T_BC1().R() * so3_exp(Vec3(0, 0.01, 0)).toRotationMatrix()), turned.T_BC1().p};
+  const Vec2 centre(good.rig.left().width() / 2.0, good.rig.left().height() / 2.0);
   compare_depths(good, with_depths_by(turned, good), [&](const Vec2& px, double before, double after) {
     // A rotation by 0.01 rad changes the disparity by 0.01 times the focal length, and the baseline is 0.11 m.
     if ((px - centre).norm() < 80) {
@@ -183,7 +183,7 @@ TEST(MotionProblem, ALensStaysInTheRangeOfItsModel) {
   const ImuSeries imu(evidence.imu);
   for (const double alpha : {0.5, 0.95}) {
     // A focal length that is very wrong and not free: the shape that would make up for it is none of the model.
-    evidence.rig.left = Camera(ExtendedUnified{1200, 1200, 367, 248, alpha, 1}, 752, 480);
+    evidence.rig.cameras[0].camera = Camera(ExtendedUnified{1200, 1200, 367, 248, alpha, 1}, 752, 480);
     evidence.working_rig = evidence.rig;
     MotionProblem problem(pair_frames(evidence), imu, {evidence.rig});
     ASSERT_GT(problem.pairs(), 20u);

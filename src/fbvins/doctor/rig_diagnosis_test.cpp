@@ -31,16 +31,15 @@ Diagnosis with(const StereoRig& rig, std::initializer_list<FindingKind> kinds) {
 }
 
 TEST(RigDiagnosis, FramesOfAPairHaveItsImagesAsLeftAndRight) {
-  StereoFrame frame{Time{1000}, std::make_shared<const Image>(1, 1), nullptr};
-  frame.more = {nullptr, std::make_shared<const Image>(2, 1)};
+  StereoFrame frame{Time{1000}, {std::make_shared<const Image>(1, 1), nullptr, nullptr, std::make_shared<const Image>(2, 1)}};
   frame.offsets = ExposureOffsets({Duration{0}, Duration{5}, Duration{0}, Duration{7}});
   const auto back = frame_of_group(frame, {1, 3});
   ASSERT_TRUE(back);
   EXPECT_EQ(back->t, Time{1005});
-  EXPECT_EQ(back->left, nullptr);
-  EXPECT_EQ(back->right->width(), 2);
+  EXPECT_EQ(back->left(), nullptr);
+  EXPECT_EQ(back->right()->width(), 2);
   EXPECT_EQ(back->offsets.of(1), Duration{2});
-  frame.more.clear();
+  frame.images.resize(2);
   EXPECT_FALSE(frame_of_group(frame, {1, 3}));
 }
 
@@ -52,7 +51,7 @@ TEST(RigDiagnosis, FindingsHaveTheNumbersOfTheirCamerasAndTheImuIsJudgedOnce) {
   all.rig = rig;
   add_group(with(rig_of(rig, ahead), {gyro_units, baseline_length}), ahead, true, all);
   Diagnosis second = with(rig_of(rig, back), {gyro_units, time_offset, focal_length});
-  second.rig.right = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
+  second.rig.cameras[1].camera = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
   add_group(second, back, false, all);
   ASSERT_EQ(all.findings.size(), 3u);
   EXPECT_EQ(all.findings[0].measured, "it is so");
@@ -69,7 +68,7 @@ TEST(RigDiagnosis, CamerasOfDifferentGroupsThatOverlapAreComparedByTheirEpipolar
   const StereoRig apart = quad();
   EXPECT_TRUE(pairs_across(apart).empty());
   StereoRig rig = apart;  // and one beside the pair ahead
-  rig.more.push_back({rig.left, {Quat::Identity(), Vec3(0.3, 0, 0)}});
+  rig.cameras.push_back({rig.left(), {Quat::Identity(), Vec3(0.3, 0, 0)}});
   const std::vector<CameraGroup> pairs = pairs_across(rig);
   ASSERT_EQ(pairs.size(), 1u);
   EXPECT_EQ(pairs[0].first, 2);
@@ -80,7 +79,7 @@ TEST(RigDiagnosis, CamerasOfDifferentGroupsThatOverlapAreComparedByTheirEpipolar
   all.rig = rig;
   Diagnosis across = with(rig_of(rig, pairs[0]), {gyro_units, right_camera_turned, focal_length});
   across.epipolar_px = 2.5;
-  across.rig.right = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
+  across.rig.cameras[1].camera = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
   add_across(across, pairs[0], all);
   ASSERT_EQ(all.findings.size(), 1u);
   EXPECT_EQ(all.findings[0].measured, "cameras 2 and 4 as left and right: it is so");
@@ -96,7 +95,7 @@ TEST(RigDiagnosis, CamerasOfDifferentGroupsThatOverlapAreComparedByTheirEpipolar
 /// A recording without any event: only which cameras are examined shows.
 TEST(RigDiagnosis, EachPairIsExaminedAndEachCameraWithoutAPartner) {
   StereoRig rig = quad();
-  rig.more.push_back({rig.left, {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), Vec3(0.3, 0, 0)}});
+  rig.cameras.push_back({rig.left(), {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), Vec3(0.3, 0, 0)}});
   int played = 0;
   const Replay replay = [&](const TakeEvent&) { return ++played, Result<void>{}; };
   const auto found = diagnose(rig, replay, CalibrationStyle::kalibr);

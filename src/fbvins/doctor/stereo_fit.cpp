@@ -72,9 +72,9 @@ RegionErrors by_region(std::span<const Match> matches, const Hypothesis& at, con
 
 StereoRig corrected(const StereoRig& rig, const Hypothesis& at) {
   StereoRig out = rig;
-  out.left = at.left, out.right = at.right;
+  out.cameras[0].camera = at.left, out.cameras[1].camera = at.right;
   const Pose<C1, C0> T_C1C0{at.R, rig.T_C1C0().p.norm() * at.t};
-  out.T_BC1 = rig.T_BC0 * T_C1C0.inverse();
+  out.cameras[1].T_BC = (rig.T_BC0() * T_C1C0.inverse()).cast_frames<B, C0>();
   return out;
 }
 
@@ -93,7 +93,7 @@ StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, co
   if (matches.size() < kFewestMatches) return fit;
   StereoProblem problem(matches, rig);
   fit.error_px = typical_error_px(matches, problem.hypothesis());
-  fit.regions = by_region(matches, problem.hypothesis(), rig.left);
+  fit.regions = by_region(matches, problem.hypothesis(), rig.left());
   double capped = problem.capped_error();
   while (fit.changes.size() < kMostChanges) {
     auto best = best_candidate(problem, focal_known ? groups_without_common_focal() : groups());
@@ -109,7 +109,7 @@ StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, co
   }
   const Hypothesis after = problem.hypothesis();
   fit.remaining_px = typical_error_px(matches, after);
-  fit.remaining = by_region(matches, after, rig.left);
+  fit.remaining = by_region(matches, after, rig.left());
   fit.rig = corrected(rig, after);
   return fit;
 }

@@ -58,7 +58,7 @@ RightMotion right_motion(Time t, const StereoRig& rig, const ImuSeries& imu, std
   RightMotion out;
   const Time at = t + Duration::from_seconds(rig.time_offset_s), before = at - kHalfStep, after = at + kHalfStep;
   if (!imu.covers(before, after)) return out;
-  const Mat3 R_C1B = rig.T_BC1.R().transpose();
+  const Mat3 R_C1B = rig.T_BC1().R().transpose();
   out.rate = R_C1B * imu.at(at).gyro_radps;
   out.change = R_C1B * (imu.at(after).gyro_radps - imu.at(before).gyro_radps) / (after - before).seconds();
   const auto pair = std::find_if(pairs.begin(), pairs.end(), [&](const FramePair& p) { return p.a <= t && t < p.b; });
@@ -85,10 +85,10 @@ std::vector<Match> collect(std::span<const StereoView> views, const StereoRig& r
 }
 
 Hypothesis::Hypothesis(const StereoRig& rig, const VectorXd& x)
-    : left(changed(rig.left, lens_of(x, kLeft))),
-      right(changed(rig.right, lens_of(x, kRight))),
+    : left(changed(rig.left(), lens_of(x, kLeft))),
+      right(changed(rig.right(), lens_of(x, kRight))),
       delay(x(kDelay)),
-      focal(rig.left.focal_px()) {
+      focal(rig.left().focal_px()) {
   const Pose<C1, C0> T = rig.T_C1C0();
   const Quat turn = so3_exp(Vec3(x.segment<3>(kTurn)));
   R = turn.toRotationMatrix() * T.R();
@@ -215,7 +215,7 @@ bool StereoProblem::plausible() const {
   constexpr double kMostLogFocal = 0.3, kMostRadial[] = {1, 3}, kMostOffCentre = 0.25;
   for (const int lens : {kLeft, kRight, kBoth}) {
     const double off_centre_px = x.segment<2>(lens + kCentre).norm();
-    if (std::abs(x(lens + kFocal)) >= kMostLogFocal || off_centre_px >= kMostOffCentre * rig_->left.width()) return false;
+    if (std::abs(x(lens + kFocal)) >= kMostLogFocal || off_centre_px >= kMostOffCentre * rig_->left().width()) return false;
     if (std::abs(x(lens + kRadial)) >= kMostRadial[0] || std::abs(x(lens + kRadial + 1)) >= kMostRadial[1]) return false;
   }
   return true;

@@ -33,8 +33,8 @@ std::optional<double> error_at(int lag, const StereoRig& rig, std::span<const St
   Pyramid left, right;
   const std::size_t step = std::max<std::size_t>(frames.size() / kViews, 1);
   for (std::size_t k = kMostLag; k + kMostLag < frames.size(); k += step) {
-    const auto& a = frames[k].left;
-    const auto& b = frames[static_cast<std::size_t>(static_cast<int>(k) + lag)].right;
+    const auto& a = frames[k].left();
+    const auto& b = frames[static_cast<std::size_t>(static_cast<int>(k) + lag)].right();
     if (!a || !b) continue;
     left.build(a->view(), kKltLevels);
     right.build(b->view(), kKltLevels);
@@ -64,14 +64,15 @@ StereoStep stereo_step(const StereoRig& rig, std::span<const StereoFrame> frames
   return step;
 }
 
-bool nearly_same(const StereoFrame& a, const StereoFrame& b) {
-  if (!a.left || !b.left || a.left->width() != b.left->width() || a.left->height() != b.left->height()) return false;
+bool nearly_same(const StereoFrame& first, const StereoFrame& second) {
+  const Image *a = first.left().get(), *b = second.left().get();
+  if (a == nullptr || b == nullptr || a->width() != b->width() || a->height() != b->height()) return false;
   constexpr int kGrid_px = 4;
   Pyramid pyramid;
-  pyramid.build(a.left->view(), 1);
+  pyramid.build(a->view(), 1);
   std::int64_t sum = 0, count = 0;
-  for (int y = 0; y < a.left->height(); y += kGrid_px)
-    for (int x = 0; x < a.left->width(); x += kGrid_px, ++count) sum += std::abs(a.left->row(y)[x] - b.left->row(y)[x]);
+  for (int y = 0; y < a->height(); y += kGrid_px)
+    for (int x = 0; x < a->width(); x += kGrid_px, ++count) sum += std::abs(a->row(y)[x] - b->row(y)[x]);
   return static_cast<double>(sum) < (2 * estimate_noise(pyramid.level(0)) + 1) * static_cast<double>(count);
 }
 
@@ -80,7 +81,7 @@ std::optional<StereoFrame> StereoRealigner::push(StereoFrame frame) {
   waiting_.push_back(std::move(frame));
   if (waiting_.size() <= static_cast<std::size_t>(std::abs(lag_))) return std::nullopt;
   StereoFrame out = lag_ > 0 ? waiting_.front() : waiting_.back();
-  out.right = lag_ > 0 ? waiting_.back().right : waiting_.front().right;
+  out.set_image(1, lag_ > 0 ? waiting_.back().right() : waiting_.front().right());
   waiting_.pop_front();
   return out;
 }

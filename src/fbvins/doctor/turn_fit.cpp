@@ -178,7 +178,7 @@ std::vector<FramePair> pair_frames(const Evidence& evidence) {
     pair.frame_a = a, pair.frame_b = b;
     pair.features = in_both(frames[a], frames[b], without_depths);
     pair.without_depths = without_depths;
-    const Camera& camera = evidence.working_rig.left;
+    const Camera& camera = evidence.working_rig.left();
     const bool near = pair.dt_s() > 0 && pair.dt_s() < 3 * kPair_s;
     if (near && (without_depths ? estimate_without_depths(camera, pair) : estimate_motion(camera, pair)))
       pairs.push_back(std::move(pair));

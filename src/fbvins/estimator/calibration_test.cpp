@@ -23,15 +23,17 @@ constexpr int kFrames = 300;
 StereoRig loose_mount(StereoRig rig, double angle_rad, double shift_m) {
   const Quat turn = so3_exp(angle_rad * Vec3(0.6, -0.5, 0.62).normalized());
   const Vec3 shift = shift_m * Vec3(1, -1, 1).normalized();
-  rig.T_BC0 = {turn * rig.T_BC0.q, Vec3(turn * rig.T_BC0.p + shift)};
-  rig.T_BC1 = {turn * rig.T_BC1.q, Vec3(turn * rig.T_BC1.p + shift)};
+  rig.cameras[0].T_BC = {turn * rig.T_BC0().q, Vec3(turn * rig.T_BC0().p + shift)};
+  rig.cameras[1].T_BC = {turn * rig.T_BC1().q, Vec3(turn * rig.T_BC1().p + shift)};
   return rig;
 }
 
 double angle_to(const Calibration& calibration, const StereoRig& truth) {
-  return so3_log(truth.T_BC0.q.conjugate() * calibration.T_BC0.q).norm();
+  return so3_log(truth.T_BC0().q.conjugate() * calibration.T_BC0().q).norm();
 }
-double shift_to(const Calibration& calibration, const StereoRig& truth) { return (truth.T_BC0.p - calibration.T_BC0.p).norm(); }
+double shift_to(const Calibration& calibration, const StereoRig& truth) {
+  return (truth.T_BC0().p - calibration.T_BC0().p).norm();
+}
 
 Calibration fly(SimulatedFlight& flight, const StereoRig& calibrated, const EstimatorOptions& options) {
   Estimator estimator(calibrated, options);
@@ -69,7 +71,7 @@ TEST(OnlineCalibration, KeepsThePoseBetweenTheCameras) {
     EstimatorOptions options = exact_noise();
     options.estimate_extrinsics = true;
     const Calibration found = fly(flight, loose_mount(flight.rig, 0.01, 0.003), options);
-    const Pose<C0, C1> expected = flight.rig.T_C1C0().inverse(), between = found.T_BC0.inverse() * found.T_BC1;
+    const Pose<C0, C1> expected = flight.rig.T_C1C0().inverse(), between = found.T_BC0().inverse() * found.T_BC1();
     EXPECT_LT((between.p - expected.p).norm(), 3e-4) << amplitude;
     EXPECT_LT(so3_log(expected.q.conjugate() * between.q).norm(), 6e-4) << amplitude;
   }
@@ -77,26 +79,26 @@ TEST(OnlineCalibration, KeepsThePoseBetweenTheCameras) {
 
 TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
   SimulatedFlight flight(Motion(0.6, 0.5), 48);
-  const Calibration calibrated{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+  const Calibration calibrated{{flight.rig.T_BC0(), flight.rig.T_BC(1)}};
   const CalibrationPrior sigmas;
   const WindowPrior prior = with_calibration_prior(first_frame_prior(NavState<G>{}, unknown_biases()), sigmas, calibrated);
   ASSERT_EQ(prior.quadratic.size(), kTiltSize + kCalibrationSize + 15);
   const auto cost = [&](const StereoRig& rig) {
     Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());
-    dx.segment<kCalibrationSize>(prior.calibration_row()) = calibration_displacement({rig.T_BC0, rig.T_BC1, 0.0}, calibrated);
+    dx.segment<kCalibrationSize>(prior.calibration_row()) = calibration_displacement({{rig.T_BC(0), rig.T_BC(1)}}, calibrated);
     return prior.quadratic.cost(dx);
   };
   // Both cameras turned by one standard deviation about an axis through the IMU: costs of the left camera's rotation and
   // of its position, by the lever arm; none of the pose between the cameras.
   const StereoRig turned = loose_mount(flight.rig, sigmas.rotation_sigma_rad, 0);
-  const double moved = (turned.T_BC0.p - flight.rig.T_BC0.p).norm() / sigmas.position_sigma_m;
+  const double moved = (turned.T_BC0().p - flight.rig.T_BC0().p).norm() / sigmas.position_sigma_m;
   EXPECT_NEAR(cost(turned), 0.5 * (1 + moved * moved), 0.02);
   // The right camera alone, along the baseline.
   StereoRig stretched = flight.rig;
-  stretched.T_BC1.p += sigmas.stereo_position_sigma_m * (flight.rig.T_BC1.p - flight.rig.T_BC0.p).normalized();
+  stretched.cameras[1].T_BC.p += sigmas.stereo_position_sigma_m * (flight.rig.T_BC1().p - flight.rig.T_BC0().p).normalized();
   EXPECT_NEAR(cost(stretched), 0.5, 1e-6);
   StereoRig squinting = flight.rig;
-  squinting.T_BC1.q = squinting.T_BC1.q * so3_exp(sigmas.stereo_rotation_sigma_rad * Vec3::UnitY());
+  squinting.cameras[1].T_BC.q = squinting.T_BC1().q * so3_exp(sigmas.stereo_rotation_sigma_rad * Vec3::UnitY());
   EXPECT_NEAR(cost(squinting), 0.5, 1e-6);
 }
 
@@ -162,7 +164,7 @@ TEST(OnlineCalibration, AGlobalShutterStaysOne) {
 TEST(OnlineCalibration, FindsTheLineDelayThatIsCommonToCamerasOfDifferentOnes) {
   constexpr double kTrue_s = 40e-6, kMore_s = 15e-6;
   SimulatedFlight flight(Motion(0.6, 0.5), 49);
-  flight.rig.right.set_own_times({.line_delay_s = kMore_s});
+  flight.rig.cameras[1].camera.set_own_times({.line_delay_s = kMore_s});
   flight.line_delay_s = kTrue_s;
   StereoRig rig = flight.rig;
   rig.line_delay_s = 0.5 * kTrue_s;
@@ -176,9 +178,9 @@ TEST(OnlineCalibration, FindsTheLineDelayThatIsCommonToCamerasOfDifferentOnes) {
 TEST(CameraTimes, ArePartOfEachObservation) {
   const auto error_m = [](const CameraTimes& of_right, bool known) {
     SimulatedFlight flight(Motion(0.6, 0.5), 51);
-    flight.rig.right.set_own_times(of_right);
+    flight.rig.cameras[1].camera.set_own_times(of_right);
     StereoRig rig = flight.rig;
-    if (!known) rig.right.set_own_times({});
+    if (!known) rig.cameras[1].camera.set_own_times({});
     Estimator estimator(rig, exact_noise());
     std::vector<Vec3> flown, truth;
     for (int k = 0; k < kFrames; ++k) {

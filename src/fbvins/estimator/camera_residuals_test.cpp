@@ -20,8 +20,8 @@ struct Scene {
   explicit Scene(const std::array<double, 4>& shift, int landmarks = 80) : features(static_cast<std::size_t>(landmarks)) {
     Mat3 R_BC;
     R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    calibration.T_BC0 = {R_BC, Vec3(0, 0.05, 0)}, calibration.T_BC1 = {R_BC, Vec3(0, -0.05, 0)};
-    calibration.more = {{R_BC, Vec3(0, 0.05, 0)}, {R_BC, Vec3(0, -0.05, 0)}};
+    const Pose<B, C0> left(R_BC, Vec3(0, 0.05, 0)), right(R_BC, Vec3(0, -0.05, 0));
+    calibration.cameras = {left, right, left, right};
     const CameraGeometry cameras(calibration);
     Rng rng(2);
     for (std::size_t i = 0; i < features.size(); ++i) {

@@ -34,8 +34,8 @@ class Scene {
     std::vector<LandmarkObservation> out;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const bool moves = i >= first_other;
-      features_[i].left = observe(rig.T_BC0.inverse() * ((moves ? other : left).inverse() * points_[i]));
-      features_[i].right = observe(rig.T_BC1.cast_frames<B, C0>().inverse() * ((moves ? other : right).inverse() * points_[i]));
+      features_[i].left = observe(rig.T_BC0().inverse() * ((moves ? other : left).inverse() * points_[i]));
+      features_[i].right = observe(rig.T_BC1().cast_frames<B, C0>().inverse() * ((moves ? other : right).inverse() * points_[i]));
       out.push_back({points_[i], &features_[i]});
     }
     return out;
@@ -44,7 +44,7 @@ class Scene {
   /// Every other point by a second pair of the same kind, each of its cameras from a pose of its own.
   std::vector<LandmarkObservation> seen_by_four(const Pose<G, B>& camera_2, const Pose<G, B>& camera_3) {
     std::vector<LandmarkObservation> out = seen({});
-    calibration.more = {rig.T_BC(0), rig.T_BC(1)};
+    calibration.cameras = {rig.T_BC(0), rig.T_BC(1), rig.T_BC(0), rig.T_BC(1)};
     for (std::size_t i = 0; i < points_.size(); i += 2) {
       features_[i].cameras = {2, 3};
       features_[i].left = observe(rig.T_BC(0).inverse() * (camera_2.inverse() * points_[i]));
@@ -54,7 +54,7 @@ class Scene {
   }
 
   StereoRig rig = test::SimulatedFlight(test::Motion(0.1, 0.1), 1).rig;
-  Calibration calibration{rig.T_BC0, rig.T_BC1, 0.0};
+  Calibration calibration{{rig.T_BC0(), rig.T_BC(1)}};
   Time now;
 
  private:

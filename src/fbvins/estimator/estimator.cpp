@@ -38,7 +38,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       exposures_(rig),
       factors_(rig, options_, sensors),
       initialiser_(options, imu_noise_, before, one_camera_),
-      keyframe_policy_(options.keyframes, rig.left.focal_px()),
+      keyframe_policy_(options.keyframes, rig.left().focal_px()),
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
       reading_noise_(imu_noise_, options.accel_unmodelled_mps2_rthz > 0 ? kAxes : 0),
       monitor_(imu_noise_, weights_of(options_).calibrating()),

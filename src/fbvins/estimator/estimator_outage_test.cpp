@@ -45,9 +45,9 @@ TEST(Estimator, ARestartForgetsWhatWasEstimatedOfTheCalibration) {
   const Calibration given = estimator.calibration();
   bool changed = false;
   for (int k = 0; k < 400 && estimator.process(flight.frame(k)).odometry.health.state != HealthState::lost; ++k)
-    changed = changed || estimator.calibration().T_BC0.p != given.T_BC0.p;
+    changed = changed || estimator.calibration().T_BC0().p != given.T_BC0().p;
   EXPECT_TRUE(changed);
-  EXPECT_EQ(estimator.calibration().T_BC0.p, given.T_BC0.p);
+  EXPECT_EQ(estimator.calibration().T_BC0().p, given.T_BC0().p);
 }
 
 TEST(Estimator, BridgesHalfASecondWithoutReadings) {

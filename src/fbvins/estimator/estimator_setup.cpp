@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "fbvins/camera/camera_groups.hpp"
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
 
 namespace fbvins {
@@ -27,8 +28,9 @@ EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) 
 }
 
 Calibration calibration_of(const StereoRig& rig) {
-  Calibration out{rig.T_BC0, rig.T_BC1, 0.0};
-  for (const MountedCamera& camera : rig.more) out.more.push_back(camera.T_BC);
+  Calibration out{.cameras = {}};
+  for (const MountedCamera& camera : rig.cameras) out.cameras.push_back(camera.T_BC);
+  if (!rig.has_right()) out.cameras.push_back(rig.depth ? depth_observer(rig.T_BC0()) : rig.T_BC0());
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/camera/camera_times.hpp"
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
@@ -14,9 +15,9 @@ const Vec3 kGravity_B(0.3, -0.2, -9.8);
 
 StereoRig cameras(double line_delay_s) {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
-  rig.T_BC0 = {so3_exp(Vec3(0.1, -0.2, 1.5)), Vec3(-0.02, -0.06, 0.01)};
-  rig.T_BC1 = {so3_exp(Vec3(0.11, -0.2, 1.49)), Vec3(-0.02, 0.05, 0.008)};
+  rig.cameras.assign(2, {Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480), {}});
+  rig.cameras[0].T_BC = {so3_exp(Vec3(0.1, -0.2, 1.5)), Vec3(-0.02, -0.06, 0.01)};
+  rig.cameras[1].T_BC = {so3_exp(Vec3(0.11, -0.2, 1.49)), Vec3(-0.02, 0.05, 0.008)};
   rig.line_delay_s = line_delay_s;
   return rig;
 }
@@ -83,10 +84,10 @@ TEST_P(ReferredToStamp, ObservationsOfAMovingBodyAreThoseOfDisplacedCameras) {
   const Case& c = GetParam();
   const StereoRig rig = cameras(c.line_delay_s);
   const Motion m;
-  const Vec3 p_B = rig.T_BC0 * Vec3(0.4, -0.5, 2);
+  const Vec3 p_B = rig.T_BC0() * Vec3(0.4, -0.5, 2);
   TrackedFrame frame = frame_of(rig, m, p_B, c.left_row, c.right_row, c.offsets);
   EXPECT_GT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B) + error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 4e-3);
-  Exposures(rig).refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {rig.T_BC0, rig.T_BC1, 0.0}, frame);
+  Exposures(rig).refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
   EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), c.left);
   EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), c.right);
 }
@@ -102,11 +103,13 @@ INSTANTIATE_TEST_SUITE_P(All, ReferredToStamp,
 
 /// The camera in which depths are seen has the rows of the left one.
 TEST(Exposures, ADepthIsSeenWithItsPixel) {
-  StereoRig rig = with_depth(cameras(kLineDelay_s), {});
+  const StereoRig sensor = with_depth(cameras(kLineDelay_s), {});
+  StereoRig rig = sensor;  // and the camera in which depths are seen
+  rig.cameras.push_back({sensor.left(), depth_observer(sensor.T_BC0())});
   const Motion m{Vec3(0.8, -1.5, 2), Vec3::Zero(), Vec3(0, 0, 1), Vec3::Zero()};
-  const Vec3 p_B = rig.T_BC0 * Vec3(0.8, -0.9, 3);
+  const Vec3 p_B = rig.T_BC0() * Vec3(0.8, -0.9, 3);
   TrackedFrame frame = frame_of(rig, m, p_B, 460, 460, {});
-  Exposures(rig).refer_to_stamp(ExposureMotion(m.readings({}), {}, kGravity_B), {rig.T_BC0, rig.T_BC1, 0.0}, frame);
+  Exposures(sensor).refer_to_stamp(ExposureMotion(m.readings({}), {}, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
   EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), 1e-4);
   EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 3e-4);  // ten metres to the right
 }
@@ -114,20 +117,20 @@ TEST(Exposures, ADepthIsSeenWithItsPixel) {
 TEST(Exposures, BeforeTheStartTheTurnAloneIsKnown) {
   const StereoRig rig = cameras(kLineDelay_s);
   const Motion m{Vec3(0.8, -1.5, 2), Vec3(5, 10, -15), Vec3::Zero(), Vec3::Zero()};
-  const Vec3 p_B = rig.T_BC0 * Vec3(0.4, -0.5, 2);
+  const Vec3 p_B = rig.T_BC0() * Vec3(0.4, -0.5, 2);
   TrackedFrame frame = frame_of(rig, m, p_B, 20, 470, {});
-  Exposures(rig).refer_to_stamp(ExposureMotion(m.readings({}), {}), {rig.T_BC0, rig.T_BC1, 0.0}, frame);
+  Exposures(rig).refer_to_stamp(ExposureMotion(m.readings({}), {}), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
   EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), Vec3::Zero(), p_B), 1e-4);
   EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), Vec3::Zero(), p_B), 1e-4);
 }
 
 TEST(Exposures, WhatIsSeenAtTheStampKeepsEveryBit) {
   const StereoRig rig = cameras(0);
-  TrackedFrame frame = frame_of(rig, Motion{}, rig.T_BC0 * Vec3(0.8, -0.9, 3), 20, 40, {});
+  TrackedFrame frame = frame_of(rig, Motion{}, rig.T_BC0() * Vec3(0.8, -0.9, 3), 20, 40, {});
   const Vec2 before = frame.features[0].left->normalised;
   const Exposures exposures(rig);
   EXPECT_TRUE(exposures.at_stamp(frame));
-  exposures.refer_to_stamp(ExposureMotion(Motion{}.readings({}), {}, kGravity_B), {rig.T_BC0, rig.T_BC1, 0.0}, frame);
+  exposures.refer_to_stamp(ExposureMotion(Motion{}.readings({}), {}, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
   EXPECT_EQ(frame.features[0].left->normalised, before);
   EXPECT_EQ(frame.features[0].left->displacement_B(Vec3(1, 2, 3)), Vec3::Zero());
   frame.offsets.set(1, Duration{1});
@@ -140,12 +143,12 @@ TEST(Exposures, EachCameraHasItsOwnRows) {
     const CameraTimes global{}, rolling{.line_delay_s = kLineDelay_s};
     const StereoRig rig = with_times(cameras(0), {right_rolls ? global : rolling, right_rolls ? rolling : global});
     const Motion m;
-    const Vec3 p_B = rig.T_BC0 * Vec3(0.4, -0.5, 2);
+    const Vec3 p_B = rig.T_BC0() * Vec3(0.4, -0.5, 2);
     TrackedFrame frame = frame_of(rig, m, p_B, 20, 40, {});
     const Vec2 before = (right_rolls ? frame.features[0].left : frame.features[0].right)->normalised;
     const Exposures exposures(rig);
     EXPECT_FALSE(exposures.at_stamp(frame));
-    exposures.refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {rig.T_BC0, rig.T_BC1, 0.0}, frame);
+    exposures.refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
     EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), 1e-4);
     EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 1e-4);
     EXPECT_EQ((right_rolls ? frame.features[0].left : frame.features[0].right)->normalised, before);

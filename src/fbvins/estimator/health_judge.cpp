@@ -11,9 +11,7 @@ namespace {
 
 using namespace thresholds;
 
-bool without_images(const TrackedFrame& frame) {
-  return !frame.has_left && !frame.has_right && std::ranges::count(frame.has_more, true) == 0;
-}
+bool without_images(const TrackedFrame& frame) { return std::ranges::count(frame.cameras, true) == 0; }
 
 }  // namespace
 
@@ -50,11 +48,8 @@ void HealthJudge::pass(const TrackedFrame& frame) {
 /// Bits, as in Health.
 std::uint8_t HealthJudge::missing_cameras(const TrackedFrame& frame) const {
   unsigned missing = 0;
-  for (int c = 0; c < cameras_; ++c) {
-    const auto k = static_cast<std::size_t>(c);
-    const bool here = c == 0 ? frame.has_left : c == 1 ? frame.has_right : k - 2 < frame.has_more.size() && frame.has_more[k - 2];
-    if (!here) missing |= 1u << c;
-  }
+  for (int c = 0; c < cameras_; ++c)
+    if (!frame.has(c)) missing |= 1u << c;
   return static_cast<std::uint8_t>(missing);
 }
 

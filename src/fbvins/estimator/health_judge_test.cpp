@@ -17,7 +17,7 @@ Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
 TrackedFrame frame_at(double t_s) {
   TrackedFrame f;
   f.t = Time{} + Duration::from_seconds(t_s);
-  f.has_left = f.has_right = true;
+  f.cameras = {true, true};
   f.stats.stereo = kManyTracks;
   f.imu.samples.resize(11);
   f.imu.longest_gap = Duration::from_seconds(0.005);
@@ -45,12 +45,12 @@ TEST(HealthJudge, NoImageIsNoImagesAndNotNoTracks) {
   Judged judged;
   for (double t_s = 0.05; t_s < 3; t_s += 0.05) {
     TrackedFrame blind = frame_at(t_s);
-    blind.has_left = blind.has_right = false;
+    blind.cameras = {};
     blind.stats.stereo = 0;
     EXPECT_EQ(judged.next(blind, 0), degraded(HealthReason::no_images)) << t_s;
   }
   TrackedFrame too_late = frame_at(3.05);
-  too_late.has_left = too_late.has_right = false;
+  too_late.cameras = {};
   EXPECT_EQ(judged.next(too_late, 0, 0, 0.5), degraded(HealthReason::no_images)) << "0.49 m added";
   EXPECT_EQ(judged.next(too_late, 0, 0, 0.52), lost(HealthReason::no_images)) << "0.51 m";
 }
@@ -69,7 +69,7 @@ TEST(HealthJudge, TheFirstImageAfterAGapIsNoImages) {
   EXPECT_EQ(judged.next(frame_at(0.70)), good());
   for (double t_s : {0.75, 0.85, 0.95}) {
     TrackedFrame blind = frame_at(t_s);
-    blind.has_left = blind.has_right = false;
+    blind.cameras = {};
     EXPECT_EQ(judged.next(blind, 0), degraded(HealthReason::no_images));
   }
   EXPECT_EQ(judged.next(frame_at(1.00)), degraded(HealthReason::no_images)) << "or of stamps without an image";
@@ -88,7 +88,7 @@ TEST(HealthJudge, OneImageIsOneCamera) {
   for (const bool left : {true, false}) {
     Judged judged;
     TrackedFrame one = frame_at(0.05);
-    (left ? one.has_right : one.has_left) = false;
+    one.set_has(left ? 1 : 0, false);
     one.stats.stereo = 0;
     const std::uint8_t missing = left ? 0b10 : 0b01;
     EXPECT_EQ(judged.next(one, left ? kManyTracks : 0), (Health{HealthState::degraded, HealthReason::one_camera, missing}));
@@ -104,7 +104,7 @@ TEST(HealthJudge, ASilentImuTakesPrecedenceOverMissingImages) {
   TrackedFrame silent = frame_at(0.05);
   silent.imu = {};
   EXPECT_EQ(judged.next(silent), degraded(HealthReason::imu_gap));
-  silent.has_left = silent.has_right = false;
+  silent.cameras = {};
   EXPECT_EQ(judged.next(silent, 0), lost(HealthReason::imu_gap)) << "nothing carries the pose";
 }
 
@@ -128,7 +128,7 @@ TEST(HealthJudge, BeforeTheStartMissingImagesTakePrecedenceOverOtherReasons) {
   TrackedFrame frame = frame_at(0);
   EXPECT_EQ(HealthJudge(EstimatorOptions{}).before_start(frame, HealthReason::too_few_features),
             (Health{HealthState::initialising, HealthReason::too_few_features}));
-  frame.has_left = frame.has_right = false;
+  frame.cameras = {};
   EXPECT_EQ(HealthJudge(EstimatorOptions{}).before_start(frame, HealthReason::too_few_features),
             (Health{HealthState::initialising, HealthReason::no_images}));
 }
@@ -164,11 +164,11 @@ TEST(HealthJudge, EachReasonInFlightIsReachedAndLeft) {
       {HealthReason::few_tracks, 9, {}, as_it_is},
       {HealthReason::few_tracks, kManyTracks, {.after_dark = true}, as_it_is},
       {HealthReason::no_tracks, 0, {}, as_it_is},
-      {HealthReason::no_images, 0, {}, [](TrackedFrame& f) { f.has_left = f.has_right = false; }},
+      {HealthReason::no_images, 0, {}, [](TrackedFrame& f) { f.cameras = {}; }},
       {HealthReason::imu_gap, kManyTracks, {}, [](TrackedFrame& f) { f.imu = {}; }},
       {HealthReason::imu_gap, kManyTracks, {}, [](TrackedFrame& f) { f.imu.longest_gap = Duration::from_seconds(0.06); }},
       {HealthReason::imu_gap, kManyTracks, {.after_gap = true}, as_it_is},
-      {HealthReason::one_camera, kManyTracks, {}, [](TrackedFrame& f) { f.has_right = false; }},
+      {HealthReason::one_camera, kManyTracks, {}, [](TrackedFrame& f) { f.set_has(1, false); }},
       {HealthReason::frontend_fault, kManyTracks, {.broken_features = 1}, as_it_is},
       {HealthReason::solver_failed, kManyTracks, {.failed_solves = 1}, as_it_is},
       {HealthReason::contradiction, kManyTracks, {.contradiction = true}, as_it_is},

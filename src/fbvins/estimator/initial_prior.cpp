@@ -62,8 +62,8 @@ WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& b
 WindowPrior with_calibration_prior(WindowPrior prior, const CalibrationPrior& sigmas, const Calibration& calibrated) {
   // Derivative of T_C0C1 = T_BC0^-1 T_BC1 by T_BC0 (dp, dtheta), T_BC1 (dp, dtheta):
   // dp = R_0^T (dp_1 - dp_0) + p_01 x dtheta_0, dtheta = dtheta_1 - R_01^T dtheta_0.
-  const Mat3 R_0 = calibrated.T_BC0.R(), R_01 = R_0.transpose() * calibrated.T_BC1.R();
-  const Vec3 p_01 = R_0.transpose() * (calibrated.T_BC1.p - calibrated.T_BC0.p);
+  const Mat3 R_0 = calibrated.T_BC0().R(), R_01 = R_0.transpose() * calibrated.T_BC1().R();
+  const Vec3 p_01 = R_0.transpose() * (calibrated.T_BC1().p - calibrated.T_BC0().p);
   Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();
   J.block<3, 3>(0, 0) = -R_0.transpose();
   J.block<3, 3>(0, 3) = hat(p_01);

@@ -53,7 +53,7 @@ TEST(FirstFramePrior, HasTheBiasesOfAnEarlierFlight) {
 
 TEST(CalibrationPrior, ComesBetweenTiltAndFrame) {
   const WindowPrior frame = first_frame_prior(tilted(), unknown_biases());
-  const Calibration calibrated{{Quat::Identity(), Vec3(0.1, 0, 0)}, {Quat::Identity(), Vec3(0.2, 0, 0)}, 0.0};
+  const Calibration calibrated{{{Quat::Identity(), Vec3(0.1, 0, 0)}, {Quat::Identity(), Vec3(0.2, 0, 0)}}};
   const WindowPrior prior = with_calibration_prior(frame, CalibrationPrior{}, calibrated);
   EXPECT_EQ(prior.calibration_row(), kTiltSize);
   EXPECT_EQ(prior.frames_row(), kTiltSize + kCalibrationSize);

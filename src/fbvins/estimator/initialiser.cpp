@@ -126,7 +126,7 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.all().empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
-  const bool halved = frame.has_left != frame.has_right && !broken && !frames_.all().empty() &&
+  const bool halved = frame.has(0) != frame.has(1) && !broken && !frames_.all().empty() &&
                       (frame.t - frames_.all().back().t).seconds() < kLongestSkip_s;
   if (halved && usable_features(frame, at_rest) < kMinFeaturesAtRest) {
     skipped_ = joined(std::move(skipped_), frame.imu);
@@ -236,7 +236,7 @@ std::optional<InitialSolution> Initialiser::start_with_one_camera(const SpacedFr
   if (!spaced.full()) return std::nullopt;
   const std::vector<TrackedFrame> frames(spaced.all().begin(), spaced.all().end());
   std::optional<std::vector<NavState<G>>> states =
-      fbvins::start_with_one_camera(frames, calibration.T_BC0, noise_, biases, gravity_mps2_);
+      fbvins::start_with_one_camera(frames, calibration.T_BC0(), noise_, biases, gravity_mps2_);
   if (!states) return std::nullopt;
   return InitialSolution{frames, std::move(*states), false, {}};
 }

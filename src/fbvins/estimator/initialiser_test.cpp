@@ -24,7 +24,7 @@ Started start(SimulatedFlight& flight, int frames, const std::optional<Pose<G, B
   EstimatorOptions options;
   options.standing = standing;
   Initialiser initialiser(options, flight.rig.imu_noise);
-  const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+  const Calibration calibration{{flight.rig.T_BC0(), flight.rig.T_BC(1)}};
   Started out;
   for (int k = 0; k < frames && !out.solution; ++k) {
     out.solution = initialiser.process(flight.frame(k), Duration::from_seconds(rest_s_a_frame * k), calibration, origin);
@@ -74,7 +74,7 @@ TEST(Initialiser, OneCameraStartsSoonInStrongMotion) {
   for (const bool strong : {true, false}) {
     SimulatedFlight flight(strong ? Motion(1.5, 1.5) : Motion(0.05, 0.05), 54);
     Initialiser initialiser({}, flight.rig.imu_noise, {}, true);
-    const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+    const Calibration calibration{{flight.rig.T_BC0(), flight.rig.T_BC(1)}};
     int first = -1;
     for (int k = 0; k < 40 && first < 0; ++k)
       if (initialiser.process(flight.frame(k), {}, calibration, {})) first = k;
@@ -145,7 +145,7 @@ TEST(Initialiser, FewFeaturesAreEnoughAtRestAndNotInMotion) {
   for (const bool rests : {true, false}) {
     SimulatedFlight flight(rests ? Motion(0, 0) : Motion(0.6, 0.3), 56);
     Initialiser initialiser(EstimatorOptions{}, flight.rig.imu_noise);
-    const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+    const Calibration calibration{{flight.rig.T_BC0(), flight.rig.T_BC(1)}};
     bool started = false;
     for (int k = 0; k < 40 && !started; ++k) {
       const TrackedFrame frame = with_features(flight.frame(k), 12);

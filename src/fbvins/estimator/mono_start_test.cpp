@@ -46,7 +46,7 @@ TEST(MonoStart, FindsScaleGravityAndBiases) {
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     SimulatedFlight flight = flight_with_one_camera(Motion(0.6, 0.3), seed);
     const std::vector<TrackedFrame> frames = spaced_frames(flight);
-    const auto states = start_with_one_camera(frames, flight.rig.T_BC0, flight.rig.imu_noise, unknown_biases(), 9.81);
+    const auto states = start_with_one_camera(frames, flight.rig.T_BC0(), flight.rig.imu_noise, unknown_biases(), 9.81);
     ASSERT_TRUE(states.has_value()) << seed;
     const NavState<W> first = flight.truth(0), last = flight.truth(kEvery * (kFrames - 1));
     const double moved = (last.T_FB.p - first.T_FB.p).norm();
@@ -60,11 +60,11 @@ TEST(MonoStart, FindsScaleGravityAndBiases) {
 
 TEST(MonoStart, RefusesAMotionWithoutParallaxOrTooFewTracks) {
   SimulatedFlight turning = flight_with_one_camera(Motion(0, 0.5), 5);
-  turning.rig.T_BC0.p.setZero();
-  EXPECT_FALSE(start_with_one_camera(spaced_frames(turning), turning.rig.T_BC0, turning.rig.imu_noise, unknown_biases(), 9.81));
+  turning.rig.cameras[0].T_BC.p.setZero();
+  EXPECT_FALSE(start_with_one_camera(spaced_frames(turning), turning.rig.T_BC0(), turning.rig.imu_noise, unknown_biases(), 9.81));
   SimulatedFlight bare = flight_with_one_camera(Motion(0.6, 0.3), 6);
   bare.max_features = 8;
-  EXPECT_FALSE(start_with_one_camera(spaced_frames(bare), bare.rig.T_BC0, bare.rig.imu_noise, unknown_biases(), 9.81));
+  EXPECT_FALSE(start_with_one_camera(spaced_frames(bare), bare.rig.T_BC0(), bare.rig.imu_noise, unknown_biases(), 9.81));
 }
 
 TEST(MonoStart, TheScalesDeviationIsThatOfTheVelocityAlongItself) {

@@ -37,7 +37,7 @@ WindowProblem one_camera_window(bool with_readings) {
   return p;
 }
 
-Vec3 centre(const WindowProblem& p, int frame) { return p.frames[frame].state.T_FB * p.calibration.T_BC0.p; }
+Vec3 centre(const WindowProblem& p, int frame) { return p.frames[frame].state.T_FB * p.calibration.T_BC0().p; }
 
 /// Everything so many times as large, seen from the first frame's camera: the images stay.
 WindowProblem scaled(WindowProblem p, double factor) {

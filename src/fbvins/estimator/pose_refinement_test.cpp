@@ -12,7 +12,7 @@ namespace pose_refinement_test {
 struct Seen {
   test::SimulatedFlight flight{test::Motion(0.5, 0.3), 31};
   TrackedFrame frame;
-  Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+  Calibration calibration{{flight.rig.T_BC0(), flight.rig.T_BC(1)}};
   Pose<G, B> truth;
   std::vector<LandmarkObservation> observations;
 
@@ -27,7 +27,7 @@ struct Seen {
     Vec3 best = Vec3::Zero();
     double least = 1e9;
     for (const Vec3& p_G : flight.points()) {
-      const Vec3 p_C = calibration.T_BC0.inverse() * (truth.inverse() * p_G);
+      const Vec3 p_C = calibration.T_BC0().inverse() * (truth.inverse() * p_G);
       if (p_C.z() < 0.2) continue;
       const double distance = (p_C.head<2>() / p_C.z() - f.left->normalised).norm();
       if (distance < least) least = distance, best = p_G;

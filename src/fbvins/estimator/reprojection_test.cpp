@@ -11,10 +11,10 @@ namespace fbvins {
 namespace reprojection_test {
 
 struct Seen {
-  Calibration calibration{{so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)},
-                          {so3_exp(Vec3(0.12, -1.21, 0.28)), Vec3(0.1, 0.02, -0.04)},
-                          0.004,
-                          2e-5};
+  Calibration calibration{
+      {{so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)}, {so3_exp(Vec3(0.12, -1.21, 0.28)), Vec3(0.1, 0.02, -0.04)}},
+      0.004,
+      2e-5};
   Pose<G, B> host{so3_exp(Vec3(0.3, 0.2, -0.5)), Vec3(1, 2, 3)};
   Pose<G, B> target{so3_exp(Vec3(0.35, 0.1, -0.45)), Vec3(1.2, 1.9, 3.1)};
   WindowLandmark landmark{.alpha_beta_rho = Vec3(0.2, -0.1, 0.4)};
@@ -33,8 +33,8 @@ struct Seen {
     s.host = host.boxplus(d.segment<3>(0), d.segment<3>(3));
     s.target = target.boxplus(d.segment<3>(6), d.segment<3>(9));
     s.landmark.alpha_beta_rho += d.segment<3>(12);
-    s.calibration.T_BC0 = calibration.T_BC0.boxplus(d.segment<3>(15), d.segment<3>(18));
-    s.calibration.T_BC1 = calibration.T_BC1.boxplus(d.segment<3>(21), d.segment<3>(24));
+    s.calibration.cameras[0] = calibration.T_BC0().boxplus(d.segment<3>(15), d.segment<3>(18));
+    s.calibration.cameras[1] = calibration.T_BC(1).boxplus(d.segment<3>(21), d.segment<3>(24));
     s.calibration.time_offset_s += d(27);
     s.calibration.line_delay_s += 0.01 * d(28);
     return s;

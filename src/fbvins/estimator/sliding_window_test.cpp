@@ -16,7 +16,7 @@ constexpr double kBaseline_m = 0.1, kStep_m = 0.1;
 /// Body and left camera are one; frame k is at x = k * kStep_m and looks along z.
 Calibration rig() {
   Calibration c;
-  c.T_BC1.p = Vec3(kBaseline_m, 0, 0);
+  c.cameras[1].p = Vec3(kBaseline_m, 0, 0);
   return c;
 }
 NavState<G> state_at(int k) {
@@ -57,7 +57,7 @@ struct Scene {
     f.id = TrackId{track};
     f.left = seen_at(p_B);
     f.left->normalised += left_shift;
-    if (stereo) f.right = seen_at(calibration.T_BC1.inverse() * p_B);
+    if (stereo) f.right = seen_at(calibration.T_BC1().inverse() * p_B);
     return f;
   }
   std::vector<TrackedFeature> all(int k, bool stereo = true) const {
@@ -85,7 +85,7 @@ struct Scene {
   }
   Vec3 position_G(int track) const {
     const Landmark& l = *landmark(track);
-    const Pose<G, C0> T_GC = window.frames().at(l.host).state.T_FB * calibration.T_BC0;
+    const Pose<G, C0> T_GC = window.frames().at(l.host).state.T_FB * calibration.T_BC0();
     return T_GC * Vec3(Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z());
   }
   const WindowProblem& fill_problem() {

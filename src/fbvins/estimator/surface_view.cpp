@@ -23,7 +23,7 @@ constexpr double kLeastCosine = 0.2;
 
 }  // namespace
 
-SurfaceFinder::SurfaceFinder(const StereoRig& rig) : camera_(rig.left) {
+SurfaceFinder::SurfaceFinder(const StereoRig& rig) : camera_(rig.left()) {
   if (rig.depth) reader_.emplace(rig);
 }
 
@@ -69,12 +69,12 @@ std::vector<SurfaceDistance> SurfaceFinder::distances(const std::vector<Place>& 
 std::shared_ptr<const SurfaceFactor> SurfaceFinder::find(const Frame& newest, const FrameList& window,
                                                          const Calibration& calibration) const {
   if (!reader_ || !reader_->is_usable(newest.depth.get())) return nullptr;
-  const std::vector<Place> seen = places(*newest.depth, calibration.T_BC0);
+  const std::vector<Place> seen = places(*newest.depth, calibration.T_BC0());
   std::vector<SurfaceDistance> best;
   FrameId reference;
   for (const Frame& frame : window) {
     if (!frame.keyframe || !reader_->is_usable(frame.depth.get())) continue;
-    std::vector<SurfaceDistance> found = distances(seen, newest, frame, calibration.T_BC0);
+    std::vector<SurfaceDistance> found = distances(seen, newest, frame, calibration.T_BC0());
     if (found.size() > best.size()) best = std::move(found), reference = frame.id;
     if (2 * best.size() > seen.size()) break;
   }

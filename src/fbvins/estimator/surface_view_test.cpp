@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
@@ -16,8 +17,9 @@ constexpr double kNoise_1pm = 0.001;
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{.fx = 230, .fy = 230, .cx = 188, .cy = 120, .k1 = -0.28, .k2 = 0.07}, 376, 240);
-  rig.T_BC0 = {(Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), Vec3(0.02, 0.05, 0.01)};
+  rig.cameras.resize(1);
+  rig.cameras[0].camera = Camera(PinholeRadtan{.fx = 230, .fy = 230, .cx = 188, .cy = 120, .k1 = -0.28, .k2 = 0.07}, 376, 240);
+  rig.cameras[0].T_BC = {(Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), Vec3(0.02, 0.05, 0.01)};
   return with_depth(rig, {.noise_at_1m_m = kNoise_1pm});
 }
 
@@ -25,13 +27,13 @@ StereoRig rig() {
 /// asked.
 std::shared_ptr<const DepthImage> seen_from(const Pose<G, B>& T_GB, bool wall_alone, std::uint64_t seed) {
   const StereoRig r = rig();
-  const Pose<G, C0> T_GC = T_GB * r.T_BC0;
+  const Pose<G, C0> T_GC = T_GB * r.T_BC0();
   Rng rng(seed, 1);
-  auto image = std::make_shared<DepthImage>(DepthImage{r.left.width(), r.left.height(), {}});
+  auto image = std::make_shared<DepthImage>(DepthImage{r.left().width(), r.left().height(), {}});
   for (int y = 0; y < image->height; ++y)
     for (int x = 0; x < image->width; ++x) {
       double rho = 0;
-      if (const auto ray = r.left.undistort(Vec2(x, y))) {
+      if (const auto ray = r.left().undistort(Vec2(x, y))) {
         const Vec3 d = T_GC.q * ray->homogeneous();
         rho = d.x() / (3 - T_GC.p.x());
         if (!wall_alone) rho = std::max({rho, d.y() / (2 - T_GC.p.y()), d.z() / (-1 - T_GC.p.z())});
@@ -51,7 +53,7 @@ Frame frame_at(int id, const Pose<G, B>& T_GB, bool wall_alone, bool keyframe = 
   return f;
 }
 
-Calibration calibration() { return {rig().T_BC0, rig().T_BC1, 0.0}; }
+Calibration calibration() { return calibration_of(rig()); }
 const Pose<G, B> kThere(so3_exp(Vec3(0.02, -0.1, 0.35)), Vec3(0.1, -0.05, 0.08));
 
 FrameList window_of(bool wall_alone) {
@@ -113,7 +115,7 @@ TEST(SurfaceFinder, WithoutDepthsThereIsNothing) {
   blind.depth = nullptr;
   EXPECT_FALSE(SurfaceFinder(rig()).find(blind, window_of(false), calibration()));
   EXPECT_FALSE(SurfaceFinder(rig()).find(frame_at(2, kThere, false), FrameList{}, calibration()));
-  const StereoRig pair = with_cameras(rig(), {rig().mounted(0), {rig().left, {rig().T_BC0.q, Vec3(0, 0, 0)}}});
+  const StereoRig pair = with_cameras(rig(), {rig().mounted(0), {rig().left(), {rig().T_BC0().q, Vec3(0, 0, 0)}}});
   EXPECT_FALSE(SurfaceFinder(pair).find(frame_at(2, kThere, false), window_of(false), calibration()));
 }
 

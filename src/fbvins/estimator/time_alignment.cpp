@@ -46,7 +46,7 @@ std::optional<TimeOffsetEstimate> correction_of(const std::optional<TimeOffsetEs
 TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled, const std::optional<TimeOffsetEstimate>& kept)
     : enabled_(enabled),
       given_(Duration::from_seconds(rig.time_offset_s)),
-      alignment_(rig.T_BC0.R(), 0.5 * rig.left.height(), rig.line_delay_s, {.known_offset = correction_of(kept, rig)}) {
+      alignment_(rig.T_BC0().R(), 0.5 * rig.left().height(), rig.line_delay_s, {.known_offset = correction_of(kept, rig)}) {
   const auto known = correction_of(kept, rig);
   if (!known || !enabled) return;
   correction_ = found_ = Duration::from_seconds(known->s);

@@ -9,10 +9,10 @@ namespace fbvins {
 
 Vec18 calibration_displacement(const Calibration& calibration, const Calibration& from) {
   Vec18 dx = Vec18::Zero();
-  dx.segment<3>(0) = calibration.T_BC0.p - from.T_BC0.p;
-  dx.segment<3>(3) = so3_log(from.T_BC0.q.conjugate() * calibration.T_BC0.q);
-  dx.segment<3>(6) = calibration.T_BC1.p - from.T_BC1.p;
-  dx.segment<3>(9) = so3_log(from.T_BC1.q.conjugate() * calibration.T_BC1.q);
+  dx.segment<3>(0) = calibration.T_BC0().p - from.T_BC0().p;
+  dx.segment<3>(3) = so3_log(from.T_BC0().q.conjugate() * calibration.T_BC0().q);
+  dx.segment<3>(6) = calibration.T_BC1().p - from.T_BC1().p;
+  dx.segment<3>(9) = so3_log(from.T_BC1().q.conjugate() * calibration.T_BC1().q);
   dx(kTimeOffsetIndex) = calibration.time_offset_s - from.time_offset_s;
   dx(kLineDelayIndex) = calibration.line_delay_s - from.line_delay_s;
   return dx;
@@ -97,8 +97,8 @@ void WindowProblem::move(const Variable& v, const Eigen::Ref<const Eigen::Vector
     }
     case Variable::Kind::tilt: tilt.angle_rad += d; break;
     case Variable::Kind::calibration:
-      calibration.T_BC0 = calibration.T_BC0.boxplus(d.segment<3>(0), d.segment<3>(3));
-      calibration.T_BC1 = calibration.T_BC1.boxplus(d.segment<3>(6), d.segment<3>(9));
+      calibration.cameras[0] = calibration.T_BC0().boxplus(d.segment<3>(0), d.segment<3>(3));
+      calibration.cameras[1] = calibration.T_BC(1).boxplus(d.segment<3>(6), d.segment<3>(9));
       calibration.time_offset_s += d(kTimeOffsetIndex);
       calibration.line_delay_s += d(kLineDelayIndex);
       break;

@@ -256,7 +256,7 @@ Window window_at_rest(std::uint64_t seed) {
   Rng rng(seed);
   Window w;
   w.problem.weights.estimate_tilt = false;
-  w.problem.calibration.T_BC1.p = Vec3(0.11, 0, 0);
+  w.problem.calibration.cameras[1].p = Vec3(0.11, 0, 0);
   w.problem.frames.resize(kFrames);
   for (int k = 0; k < kFrames; ++k) {
     w.problem.frames[k].id = FrameId{k};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/frontend/frontend_options.hpp"
 #include "tests/support/test_wall.hpp"
 
@@ -25,7 +26,7 @@ SensorPacket packet(int k, std::shared_ptr<const DepthImage> depth) {
   SensorPacket p;
   p.id = FrameId{k};
   p.frame.t = Time{50'000'000LL * k};
-  p.frame.left = wall.render(0.01 * k, static_cast<std::uint64_t>(k));
+  p.frame.set_image(0, wall.render(0.01 * k, static_cast<std::uint64_t>(k)));
   p.frame.depth = std::move(depth);
   for (int i = 0; k > 0 && i <= 10; ++i)
     p.imu.samples.push_back({Time{p.frame.t.ns - 50'000'000 + 5'000'000 * i}, Vec3::Zero(), Vec3(0, 0, 9.81)});
@@ -41,7 +42,7 @@ class DepthImageIn : public testing::TestWithParam<const char*> {
 TEST_P(DepthImageIn, EachFeatureOnItHasADepth) {
   for (int k = 0; k < 6; ++k) {
     const TrackedFrame frame = frontend_->process(packet(k, depth_from(120)), {});
-    EXPECT_TRUE(frame.has_left && frame.has_right);
+    EXPECT_TRUE(frame.has(0) && frame.has(1));
     int with_depth = 0, beside = 0;
     for (const TrackedFeature& f : frame.features) {
       ASSERT_TRUE(f.left);
@@ -65,8 +66,8 @@ TEST_P(DepthImageIn, WithoutItTracksGoOn) {
   DepthImage other_size{10, 10, std::vector<std::uint16_t>(100, 3000)};
   for (const auto& none : {std::shared_ptr<const DepthImage>(), std::make_shared<const DepthImage>(other_size)}) {
     const TrackedFrame frame = frontend_->process(packet(none ? 4 : 3, none), {});
-    EXPECT_TRUE(frame.has_left);
-    EXPECT_FALSE(frame.has_right);
+    EXPECT_TRUE(frame.has(0));
+    EXPECT_FALSE(frame.has(1));
     EXPECT_GT(frame.stats.tracked, 30);
     EXPECT_TRUE(std::ranges::none_of(frame.features, [](const TrackedFeature& f) { return f.right.has_value(); }));
   }

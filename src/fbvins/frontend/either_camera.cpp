@@ -9,7 +9,7 @@ namespace fbvins {
 namespace {
 
 SensorPacket mirrored(SensorPacket packet) {
-  std::swap(packet.frame.left, packet.frame.right);
+  packet.frame.swap_left_right();
   const ExposureOffsets offsets = packet.frame.offsets;
   packet.frame.offsets.set(0, offsets.of(1));
   packet.frame.offsets.set(1, offsets.of(0));
@@ -18,7 +18,7 @@ SensorPacket mirrored(SensorPacket packet) {
 
 TrackedFrame mirrored(TrackedFrame frame) {
   for (TrackedFeature& feature : frame.features) std::swap(feature.left, feature.right);
-  std::swap(frame.has_left, frame.has_right);
+  frame.cameras = {frame.has(1), frame.has(0)};
   std::swap(frame.stats.mean_brightness_left, frame.stats.mean_brightness_right);
   return frame;
 }
@@ -27,14 +27,12 @@ TrackedFrame mirrored(TrackedFrame frame) {
 
 StereoRig mirrored(const StereoRig& rig) {
   StereoRig out = rig;
-  std::swap(out.left, out.right);
-  out.T_BC0 = rig.T_BC1.cast_frames<B, C0>();
-  out.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+  std::swap(out.cameras[0], out.cameras[1]);
   return out;
 }
 
 EitherCamera::EitherCamera(const StereoRig& rig, std::unique_ptr<LeadingFrontend> left, std::unique_ptr<LeadingFrontend> right)
-    : left_camera_(rig.left), right_camera_(rig.right), left_(std::move(left)), right_(std::move(right)) {}
+    : left_camera_(rig.left()), right_camera_(rig.right()), left_(std::move(left)), right_(std::move(right)) {}
 
 TrackedFrame EitherCamera::process(const SensorPacket& packet, const StatePrior& prior) {
   choose(packet.frame);
@@ -44,13 +42,13 @@ TrackedFrame EitherCamera::process(const SensorPacket& packet, const StatePrior&
   }
   left_->stand_by(packet, prior);
   TrackedFrame out = mirrored(right_->process(mirrored(packet), prior));
-  if (out.has_left) lead_with(false);  // from the next image on: both cameras saw this one
+  if (out.has(0)) lead_with(false);  // from the next image on: both cameras saw this one
   return out;
 }
 
 /// The camera whose image did not come cannot lead.
 void EitherCamera::choose(const StereoFrame& frame) {
-  const bool left = is_usable(frame.left.get(), left_camera_), right = is_usable(frame.right.get(), right_camera_);
+  const bool left = is_usable(frame.left().get(), left_camera_), right = is_usable(frame.right().get(), right_camera_);
   if (!right_leads_) {
     if (!left && right) lead_with(true);
   } else if (left && left_->reaches(frame.t)) {

@@ -21,8 +21,8 @@ SensorPacket packet(int k, bool left, bool right) {
   SensorPacket p;
   p.id = FrameId{k};
   p.frame.t = Time{50'000'000LL * k};
-  if (left) p.frame.left = wall.render(x_m(k), static_cast<std::uint64_t>(2 * k));
-  if (right) p.frame.right = wall.render(x_m(k) + TestWall::kBaseline_m, static_cast<std::uint64_t>(2 * k + 1));
+  if (left) p.frame.set_image(0, wall.render(x_m(k), static_cast<std::uint64_t>(2 * k)));
+  if (right) p.frame.set_image(1, wall.render(x_m(k) + TestWall::kBaseline_m, static_cast<std::uint64_t>(2 * k + 1)));
   for (int i = 0; k > 0 && i <= 10; ++i)
     p.imu.samples.push_back({Time{p.frame.t.ns - 50'000'000 + 5'000'000 * i}, Vec3::Zero(), Vec3(0, 0, 9.81)});
   return p;
@@ -55,8 +55,8 @@ class EitherCameraOf : public testing::TestWithParam<const char*> {
   /// Every feature is seen by a camera whose image came, once, and each track stays where it began on the wall.
   TrackedFrame process(int k, bool left, bool right) {
     TrackedFrame frame = frontend_->process(packet(k, left, right), {});
-    EXPECT_EQ(frame.has_left, left);
-    EXPECT_EQ(frame.has_right, right);
+    EXPECT_EQ(frame.has(0), left);
+    EXPECT_EQ(frame.has(1), right);
     std::set<TrackId> ids;
     int strayed = 0;
     for (const TrackedFeature& f : frame.features) {

@@ -25,12 +25,12 @@ void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
   t_right_ = frame.t + frame.offsets.of(1);
   left_.clear();
   right_.clear();
-  if (frame.left) left_.build(frame.left->view(), levels_);
-  if (frame.right) right_.build(frame.right->view(), levels_);
+  if (frame.left()) left_.build(frame.left()->view(), levels_);
+  if (frame.right()) right_.build(frame.right()->view(), levels_);
   stats.mean_brightness_left = mean_brightness(left_);
   stats.mean_brightness_right = mean_brightness(right_);
-  clear_if_of_another_size(left_, rig_.left);
-  clear_if_of_another_size(right_, rig_.right);
+  clear_if_of_another_size(left_, rig_.left());
+  clear_if_of_another_size(right_, rig_.right());
   depth_ = reader_ && reader_->is_usable(frame.depth.get()) ? frame.depth : nullptr;
 }
 

@@ -10,16 +10,12 @@ constexpr int kWidth = 96, kHeight = 64;
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{.fx = 80, .fy = 80, .cx = 48, .cy = 32}, kWidth, kHeight);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{.fx = 80, .fy = 80, .cx = 48, .cy = 32}, kWidth, kHeight), {}});
   return rig;
 }
 
 StereoFrame frame(double t_s, std::shared_ptr<const Image> left, std::shared_ptr<const Image> right = nullptr) {
-  StereoFrame f;
-  f.t = Time{} + Duration::from_seconds(t_s);
-  f.left = std::move(left);
-  f.right = std::move(right);
-  return f;
+  return {Time{} + Duration::from_seconds(t_s), {std::move(left), std::move(right)}};
 }
 
 std::shared_ptr<const Image> grey(std::uint8_t value, int width = kWidth) {

@@ -13,8 +13,8 @@ namespace frontend_options_test {
 
 StereoRig rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{.fx = 200, .fy = 200, .cx = 160, .cy = 120}, 320, 240);
-  rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(0.11, 0, 0));
+  rig.cameras.assign(2, {Camera(PinholeRadtan{.fx = 200, .fy = 200, .cx = 160, .cy = 120}, 320, 240), {}});
+  rig.cameras[1].T_BC = Pose<B, C0>(Quat::Identity(), Vec3(0.11, 0, 0));
   return rig;
 }
 
@@ -25,8 +25,8 @@ TEST(FrontendRegistry, EveryNameMakesAFrontendThatTakesAnImage) {
     auto frontend = make_frontend(rig(), name);
     ASSERT_TRUE(frontend.ok()) << name << ": " << frontend.error().message;
     SensorPacket packet;
-    packet.frame.left = std::make_shared<const Image>(320, 240, std::uint8_t{90});
-    EXPECT_TRUE((*frontend)->process(packet, StatePrior{}).has_left) << name;
+    packet.frame.set_image(0, std::make_shared<const Image>(320, 240, std::uint8_t{90}));
+    EXPECT_TRUE((*frontend)->process(packet, StatePrior{}).has(0)) << name;
   }
 }
 
@@ -52,7 +52,7 @@ TEST(FrontendRegistry, OneOfYourOwnIsMadeByItsNameAndReadsItsOptions) {
   struct Blind final : Frontend {
     TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
       TrackedFrame out;
-      out.has_left = packet.frame.left != nullptr;
+      out.set_has(0, packet.frame.left() != nullptr);
       return out;
     }
   };

@@ -43,13 +43,13 @@ bool GenericLead::is_usable_feature(const TrackedFeature& feature) const {
            !camera.hidden(observation->pixel, 0);
   };
   if (!feature.left && !feature.right) return false;
-  return (!feature.left || seen(feature.left, rig_.left)) && (!feature.right || seen(feature.right, rig_.right));
+  return (!feature.left || seen(feature.left, rig_.left())) && (!feature.right || seen(feature.right, rig_.right()));
 }
 
 TrackedFrame GenericLead::process(const SensorPacket& packet, const StatePrior& prior) {
   TrackedFrame out = frontend_->process(packet, prior);
-  out.has_left = is_usable(packet.frame.left.get(), rig_.left);
-  if (!rig_.depth) out.has_right = rig_.has_right() && is_usable(packet.frame.right.get(), rig_.right);
+  out.set_has(0, is_usable(packet.frame.left().get(), rig_.left()));
+  if (!rig_.depth) out.set_has(1, rig_.has_right() && is_usable(packet.frame.right().get(), rig_.right()));
   std::erase_if(out.features, [this](const TrackedFeature& feature) { return !is_usable_feature(feature); });
   for (TrackedFeature& feature : out.features) {
     next_own_ = std::max(next_own_, feature.id.value + 1);

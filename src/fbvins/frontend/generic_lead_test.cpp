@@ -15,17 +15,17 @@ Camera camera() { return Camera(PinholeRadtan{.fx = 200, .fy = 200, .cx = 160, .
 
 StereoRig pair() {
   StereoRig rig;
-  rig.left = rig.right = camera();
-  rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(0.11, 0, 0));
+  rig.cameras.assign(2, {camera(), {}});
+  rig.cameras[1].T_BC = Pose<B, C0>(Quat::Identity(), Vec3(0.11, 0, 0));
   return rig;
 }
 
 /// Follows one feature in the left image under number 0, and gives each image one more that is new.
 struct Counting final : Frontend {
-  explicit Counting(const StereoRig& rig, std::vector<LandmarkUpdate>* told = nullptr) : camera(rig.left), told(told) {}
+  explicit Counting(const StereoRig& rig, std::vector<LandmarkUpdate>* told = nullptr) : camera(rig.left()), told(told) {}
   TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
     TrackedFrame out;
-    if (!packet.frame.left) return out;
+    if (!packet.frame.left()) return out;
     out.features.push_back({TrackId{0}, observe(camera, Vec2(50, 60), 1.0), std::nullopt});
     out.features.push_back({TrackId{next++}, observe(camera, Vec2(150, 60), 1.0), std::nullopt});
     return out;
@@ -42,8 +42,8 @@ SensorPacket packet(int k, bool left, bool right) {
   SensorPacket out;
   out.id = FrameId{k};
   out.frame.t = Time{50'000'000LL * k};
-  if (left) out.frame.left = std::make_shared<const Image>(320, 240, std::uint8_t{90});
-  if (right) out.frame.right = std::make_shared<const Image>(320, 240, std::uint8_t{90});
+  if (left) out.frame.set_image(0, std::make_shared<const Image>(320, 240, std::uint8_t{90}));
+  if (right) out.frame.set_image(1, std::make_shared<const Image>(320, 240, std::uint8_t{90}));
   return out;
 }
 
@@ -54,8 +54,8 @@ TEST(GenericLead, ACameraThatFailsIsReplacedByTheOtherOneWithNewTracks) {
     for (const TrackedFeature& f : frontend->process(packet(k, true, true), {}).features) of_left.insert(f.id);
   for (int k = 5; k < 25; ++k) {
     const TrackedFrame frame = frontend->process(packet(k, false, true), {});
-    EXPECT_FALSE(frame.has_left);
-    EXPECT_TRUE(frame.has_right);
+    EXPECT_FALSE(frame.has(0));
+    EXPECT_TRUE(frame.has(1));
     ASSERT_EQ(frame.features.size(), 2U);
     for (const TrackedFeature& f : frame.features) {
       EXPECT_FALSE(f.left);
@@ -113,7 +113,7 @@ TEST(GenericLead, WhatAMaskHidesOrIsNoNumberIsLeftOut) {
   Image hidden(320, 240, std::uint8_t{255});
   for (int v = 0; v < 240; ++v)
     for (int u = 0; u < 100; ++u) hidden.at(u, v) = 0;
-  rig.left.set_mask(std::make_shared<const Mask>(hidden));
+  rig.cameras[0].camera.set_mask(std::make_shared<const Mask>(hidden));
   GenericLead lead(rig, [](const StereoRig&) { return std::make_unique<Spoilt>(); });
   const TrackedFrame frame = lead.process(packet(0, true, true), {});
   ASSERT_EQ(frame.features.size(), 1U);

@@ -31,7 +31,7 @@ struct Scene {
   }
   void take(std::shared_ptr<const Image> left) {
     StereoFrame frame;
-    frame.left = std::move(left);
+    frame.set_image(0, std::move(left));
     images.take(frame, stats);
   }
   bool follow(const CameraMotion& motion) { return follower.follow(track, *patches, motion, 0, images, stats); }

@@ -25,11 +25,11 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
       most_(options.max_features),
       rig_(rig),
       images_(rig, kKltLevels),
-      predictor_(rig.T_BC0),
+      predictor_(rig.T_BC0()),
       tracks_(options.max_features),
-      follower_(rig.left, rig.has_right() ? kFollowedByPair : KltFollowEffort{}),
-      motion_(rig.left, baseline_for_depths_m(rig)),
-      epipolar_(rig.left.focal_px(), kSeed),
+      follower_(rig.left(), rig.has_right() ? kFollowedByPair : KltFollowEffort{}),
+      motion_(rig.left(), baseline_for_depths_m(rig)),
+      epipolar_(rig.left().focal_px(), kSeed),
       detector_(options.min_distance_px, rig.has_right() ? kCellsPerCorner : ShiTomasiDetector::kFewestCells),
       stereo_(rig, options.min_depth_m, kStereo) {}
 
@@ -47,11 +47,10 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
     tracks_.end_all(TrackStatus::lost);
     tracks_.drop_ended();
   }
-  out.has_left = !images_.left().empty();
-  out.has_right = images_.has_depth();
+  out.cameras = {!images_.left().empty(), images_.has_depth()};
   stats.pyramid_ms = timer.lap_ms();
   // Without a left image tracks stay as they are; the motion to the next image spans the gap.
-  if (!out.has_left) return out;
+  if (!out.has(0)) return out;
 
   if (images_.has_before()) {
     const CameraMotion motion = predictor_.between(images_.t_before(), images_.t());
@@ -64,7 +63,7 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
   stats.detect_ms = timer.lap_ms();
   match_stereo(stats);
   stats.stereo_ms = timer.lap_ms();
-  out.features = features_of(tracks_, rig_.left, options_.sigma_px);
+  out.features = features_of(tracks_, rig_.left(), options_.sigma_px);
   images_.advance();
   stats.geometry_ms += timer.lap_ms();
   return out;
@@ -119,12 +118,12 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
   occupied.reserve(tracks_.size());
   for (const KltTrack& track : tracks_) occupied.push_back(track.px);
   const int wanted = std::min(most_, options_.max_features) - static_cast<int>(tracks_.size());
-  for (const Corner& corner : detector_.detect(images_.left(), occupied, wanted, rig_.left.mask().get()))
+  for (const Corner& corner : detector_.detect(images_.left(), occupied, wanted, rig_.left().mask().get()))
     if (start_track(corner.px)) ++stats.detected;
 }
 
 bool KltFrontend::start_track(const Vec2& px) {
-  const auto normalised = rig_.left.undistort(px);
+  const auto normalised = rig_.left().undistort(px);
   if (!normalised) return false;
   KltTrack track;
   track.px = px;
@@ -194,7 +193,7 @@ bool KltFrontend::measure_depth(KltTrack& track) {
   const StereoMatch match = stereo_.match(tracks_.patches(track).newest, track.px, track.normalised, track.inverse_depth,
                                           images_.left(), images_.right());
   if (match.failure != StereoFailure::none) return false;
-  track.right = observe(rig_.right, match.px, match.normalised, options_.sigma_px);
+  track.right = observe(rig_.right(), match.px, match.normalised, options_.sigma_px);
   track.inverse_depth = match.inverse_depth;
   return true;
 }

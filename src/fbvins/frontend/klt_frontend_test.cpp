@@ -15,18 +15,19 @@ namespace klt_frontend_test {
 class Wall {
  public:
   Wall() {
-    rig.left = Camera(PinholeRadtan{230, 229, 160, 118, -0.28, 0.07, 2e-4, 2e-5}, 320, 240);
-    rig.right = Camera(PinholeRadtan{229, 230, 162, 121, -0.27, 0.07, -1e-4, 3e-5}, 320, 240);
-    rig.T_BC0 = Pose<B, C0>(so3_exp(Vec3(0.01, -0.02, 0.3)), Vec3(0.02, -0.01, 0.03));
+    rig.cameras.resize(2);
+    rig.cameras[0].camera = Camera(PinholeRadtan{230, 229, 160, 118, -0.28, 0.07, 2e-4, 2e-5}, 320, 240);
+    rig.cameras[1].camera = Camera(PinholeRadtan{229, 230, 162, 121, -0.27, 0.07, -1e-4, 3e-5}, 320, 240);
+    rig.cameras[0].T_BC = Pose<B, C0>(so3_exp(Vec3(0.01, -0.02, 0.3)), Vec3(0.02, -0.01, 0.03));
     const Pose<C0, C1> T_C0C1(so3_exp(Vec3(0.004, -0.006, 0.003)), Vec3(0.11, 0.001, -0.002));
-    rig.T_BC1 = rig.T_BC0 * T_C0C1;
+    rig.cameras[1].T_BC = (rig.T_BC0() * T_C0C1).cast_frames<B, C0>();
   }
 
   static double time_s(int k) { return 0.05 * k; }
   Pose<G, C0> T_GC0(double s) const {
     return {so3_exp(Vec3(0.1 * std::sin(2 * s), -0.3 * s, 0.2 * s)), Vec3(0.5 * s, 0.1 * s * s, 0.3 * s)};
   }
-  Pose<G, B> T_GB(double s) const { return T_GC0(s) * rig.T_BC0.inverse(); }
+  Pose<G, B> T_GB(double s) const { return T_GC0(s) * rig.T_BC0().inverse(); }
 
   /// Where the ray of a left pixel's normalised coordinates meets the wall.
   template <class C>
@@ -50,8 +51,8 @@ class Wall {
     SensorPacket packet;
     packet.id = FrameId{k};
     packet.frame.t = Time{} + Duration::from_seconds(time_s(k));
-    packet.frame.left = render(rig.left, T_GC0(time_s(k)), gain);
-    packet.frame.right = render(rig.right, T_GC0(time_s(k)) * rig.T_BC0.inverse() * rig.T_BC1, 1.2 * gain);
+    packet.frame.set_image(0, render(rig.left(), T_GC0(time_s(k)), gain));
+    packet.frame.set_image(1, render(rig.right(), T_GC0(time_s(k)) * rig.T_BC0().inverse() * rig.T_BC1(), 1.2 * gain));
     if (k > 0) packet.imu = imu(time_s(k - 1), time_s(k));
     return packet;
   }
@@ -102,13 +103,14 @@ struct Errors {
   void add(const Wall& wall, const TrackedFrame& frame) {
     const double s = frame.t.seconds();
     const Pose<G, C0> T_GC0 = wall.T_GC0(s);
-    const Pose<G, C1> T_GC1 = wall.T_GB(s) * wall.rig.T_BC1;
+    const Pose<G, C1> T_GC1 = wall.T_GB(s) * wall.rig.T_BC1();
     for (const TrackedFeature& feature : frame.features) {
       const Vec3 here = Wall::on_wall(T_GC0, feature.left->normalised);
       const Vec3& first = points.emplace(feature.id, here).first->second;
       if (feature.age_frames > 0)
-        left.push_back((wall.rig.left.project(T_GC0.inverse() * first).value() - feature.left->pixel).norm());
-      if (feature.right) right.push_back((wall.rig.right.project(T_GC1.inverse() * here).value() - feature.right->pixel).norm());
+        left.push_back((wall.rig.left().project(T_GC0.inverse() * first).value() - feature.left->pixel).norm());
+      if (feature.right)
+        right.push_back((wall.rig.right().project(T_GC1.inverse() * here).value() - feature.right->pixel).norm());
     }
   }
   static double quantile(std::vector<double> v, double q) {
@@ -150,9 +152,9 @@ TEST(KltFrontend, ObservationsAreConsistentWithTheCamera) {
   const TrackedFrame out = frontend.process(wall.packet(0), StatePrior{});
   ASSERT_FALSE(out.features.empty());
   for (const TrackedFeature& feature : out.features) {
-    EXPECT_LT((wall.rig.left.distort(feature.left->normalised) - feature.left->pixel).norm(), 1e-6);
+    EXPECT_LT((wall.rig.left().distort(feature.left->normalised) - feature.left->pixel).norm(), 1e-6);
     const Vec2 d(1e-5, -2e-5);
-    const Vec2 moved = (wall.rig.left.distort(feature.left->normalised + d) - feature.left->pixel) / 0.5;
+    const Vec2 moved = (wall.rig.left().distort(feature.left->normalised + d) - feature.left->pixel) / 0.5;
     EXPECT_LT((feature.left->sqrt_information * d - moved).norm(), 1e-2 * moved.norm());
     EXPECT_EQ(feature.age_frames, 0);
   }
@@ -172,8 +174,8 @@ TEST(KltFrontend, BlackImagesLoseFeaturesAndLightBringsThemBack) {
   KltFrontend frontend(wall.rig, small_options());
   const TrackedFrame first = frontend.process(wall.packet(0), StatePrior{});
   SensorPacket dark = wall.packet(1);
-  dark.frame.left = std::make_shared<Image>(320, 240);
-  dark.frame.right = std::make_shared<Image>(320, 240);
+  dark.frame.set_image(0, std::make_shared<Image>(320, 240));
+  dark.frame.set_image(1, std::make_shared<Image>(320, 240));
   const TrackedFrame black = frontend.process(dark, StatePrior{});
   EXPECT_TRUE(black.features.empty());
   EXPECT_EQ(black.stats.mean_brightness_left, 0);
@@ -186,12 +188,12 @@ TEST(KltFrontend, AMissingLeftImageIsBridgedAndAMissingRightOneCostsOnlyStereo) 
   KltFrontend frontend(wall.rig, small_options());
   frontend.process(wall.packet(0), StatePrior{});
   SensorPacket no_right = wall.packet(1);
-  no_right.frame.right = nullptr;
+  no_right.frame.set_image(1, nullptr);
   const TrackedFrame left_only = frontend.process(no_right, wall.prior(0));
   EXPECT_GE(left_only.stats.tracked, 35);
   EXPECT_EQ(left_only.stats.stereo, 0);
   SensorPacket blind = wall.packet(2);
-  blind.frame.left = nullptr;
+  blind.frame.set_image(0, nullptr);
   EXPECT_TRUE(frontend.process(blind, wall.prior(1)).features.empty());
   const TrackedFrame back = frontend.process(wall.packet(3), wall.prior(1));
   EXPECT_GE(back.stats.tracked, 25);
@@ -217,8 +219,8 @@ TEST(KltFrontend, ImagesOfAnotherSizeAreNotUsed) {
   KltFrontend frontend(wall.rig, small_options());
   frontend.process(wall.packet(0), StatePrior{});
   SensorPacket odd = wall.packet(1);
-  odd.frame.left = std::make_shared<Image>(160, 120, std::uint8_t{90});
-  odd.frame.right = std::make_shared<Image>(7, 3, std::uint8_t{90});
+  odd.frame.set_image(0, std::make_shared<Image>(160, 120, std::uint8_t{90}));
+  odd.frame.set_image(1, std::make_shared<Image>(7, 3, std::uint8_t{90}));
   EXPECT_TRUE(frontend.process(odd, StatePrior{}).features.empty());
   EXPECT_GE(frontend.process(wall.packet(2), StatePrior{}).features.size(), 40u);
 }
@@ -243,17 +245,17 @@ TEST(KltFrontend, HasNoFeatureInTheMask) {
   Image left(320, 240, 255), right(320, 240, 255);
   hide(left, MaskRectangle{0, 150, 320, 90});
   hide(right, MaskCircle{160, 90, 40});
-  wall.rig.left.set_mask(std::make_shared<const Mask>(left));
-  wall.rig.right.set_mask(std::make_shared<const Mask>(right));
+  wall.rig.cameras[0].camera.set_mask(std::make_shared<const Mask>(left));
+  wall.rig.cameras[1].camera.set_mask(std::make_shared<const Mask>(right));
   KltFrontend frontend(wall.rig, small_options());
   int in_right = 0;
   for (int k = 0; k < 10; ++k) {
     const TrackedFrame out = frontend.process(wall.packet(k), k > 0 ? wall.prior(k - 1) : StatePrior{});
     EXPECT_GE(out.features.size(), 25u) << k;
     for (const TrackedFeature& feature : out.features) {
-      EXPECT_FALSE(wall.rig.left.hidden(feature.left->pixel, kPatchBorder_px));
+      EXPECT_FALSE(wall.rig.left().hidden(feature.left->pixel, kPatchBorder_px));
       if (!feature.right) continue;
-      EXPECT_FALSE(wall.rig.right.hidden(feature.right->pixel, kPatchBorder_px));
+      EXPECT_FALSE(wall.rig.right().hidden(feature.right->pixel, kPatchBorder_px));
       ++in_right;
     }
   }

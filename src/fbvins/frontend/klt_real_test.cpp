@@ -23,7 +23,8 @@ void add_epipolar_errors(const StereoRig& rig, const TrackedFrame& frame, std::v
   for (const TrackedFeature& feature : frame.features) {
     if (!feature.right) continue;
     const Vec3 line = E * feature.left->normalised.homogeneous();
-    errors.push_back(std::abs(feature.right->normalised.homogeneous().dot(line)) / line.head<2>().norm() * rig.right.focal_px());
+    errors.push_back(std::abs(feature.right->normalised.homogeneous().dot(line)) / line.head<2>().norm() *
+                     rig.right().focal_px());
   }
 }
 

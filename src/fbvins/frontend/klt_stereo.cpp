@@ -40,17 +40,17 @@ bool images_are_turned(const StereoRig& rig) {
   const Mat3 R_rl = rig.T_C1C0().R();
   for (int y = 0; y < kSamples; ++y)
     for (int x = 0; x < kSamples; ++x) {
-      const Vec2 left_px((x + 0.5) * rig.left.width() / kSamples, (y + 0.5) * rig.left.height() / kSamples);
-      const auto normalised = rig.left.undistort(left_px);
-      if (!normalised || rig.left.hidden(left_px, 0)) continue;
+      const Vec2 left_px((x + 0.5) * rig.left().width() / kSamples, (y + 0.5) * rig.left().height() / kSamples);
+      const auto normalised = rig.left().undistort(left_px);
+      if (!normalised || rig.left().hidden(left_px, 0)) continue;
       const Vec3 p_right = R_rl * normalised->homogeneous();
-      const auto right_px = rig.right.project(p_right);
-      if (!right_px || !rig.right.inside(*right_px)) continue;
+      const auto right_px = rig.right().project(p_right);
+      if (!right_px || !rig.right().inside(*right_px)) continue;
       PatchReference patch;
       Mat2 J_pixel_normalised;
-      rig.left.distort(*normalised, &J_pixel_normalised);
+      rig.left().distort(*normalised, &J_pixel_normalised);
       patch.J_normalised_pixel_then = J_pixel_normalised.inverse();
-      const Mat2 J = seen_from_right(patch, R_rl, p_right.z()).warp(rig.right, p_right.hnormalized());
+      const Mat2 J = seen_from_right(patch, R_rl, p_right.z()).warp(rig.right(), p_right.hnormalized());
       if (std::abs(std::atan2(J(1, 0) - J(0, 1), J(0, 0) + J(1, 1))) > kLeastTurned_rad) return true;
     }
   return false;
@@ -61,10 +61,10 @@ bool images_are_turned(const StereoRig& rig) {
 KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, double min_depth_m, const KltStereoEffort& effort)
     : min_depth_m_(min_depth_m),
       effort_(effort),
-      camera_left_(rig.left),
-      camera_right_(rig.right),
+      camera_left_(rig.left()),
+      camera_right_(rig.right()),
       turned_(images_are_turned(rig)),
-      focal_px_(rig.right.focal_px()) {
+      focal_px_(rig.right().focal_px()) {
   place(rig.T_C1C0());
 }
 

@@ -14,7 +14,7 @@ namespace klt_stereo_test {
 /// The wall, seen by a pair whose right camera is turned about its axis.
 struct TurnedPair {
   explicit TurnedPair(double angle_rad) : angle(angle_rad), rig(wall.rig()) {
-    rig.T_BC1.q = so3_exp(Vec3(0, 0, angle_rad));
+    rig.cameras[1].T_BC.q = so3_exp(Vec3(0, 0, angle_rad));
     left.build(wall.render(0, 1)->view(), kLevels);
     right.build(turned_image().view(), kLevels);
   }
@@ -37,7 +37,7 @@ struct TurnedPair {
         KltTemplate patch;
         if (!patch.cut(left, px, 0, kLevels - 1)) continue;
         ++tried;
-        const StereoMatch match = matcher.match(patch, px, *rig.left.undistort(px), inverse_depth, left, right);
+        const StereoMatch match = matcher.match(patch, px, *rig.left().undistort(px), inverse_depth, left, right);
         if (match.failure != StereoFailure::none) continue;
         ++matched;
         EXPECT_NEAR(match.inverse_depth, 1 / TestWall::kDepth_m, 0.02) << px.transpose();

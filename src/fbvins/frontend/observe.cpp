@@ -29,7 +29,7 @@ Observation observe_depth(const Vec2& px, const Vec2& left_normalised, const Mea
 
 double baseline_for_depths_m(const StereoRig& rig) {
   constexpr double kDisparity_px = 0.4;
-  return rig.depth ? kDisparity_px / (rig.left.focal_px() * rig.depth->noise_at_1m_m) : rig.T_C1C0().p.norm();
+  return rig.depth ? kDisparity_px / (rig.left().focal_px() * rig.depth->noise_at_1m_m) : rig.T_C1C0().p.norm();
 }
 
 }  // namespace fbvins

@@ -5,7 +5,7 @@
 
 namespace fbvins {
 OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options)
-    : right_camera_(rig.right),
+    : right_camera_(rig.right()),
       sigma_px_(options.sigma_px),
       rectified_(rig, options.min_depth_m, options.stereo_epipolar_px),
       by_alignment_(rig, options.min_depth_m) {}

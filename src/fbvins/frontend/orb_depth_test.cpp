@@ -22,10 +22,10 @@ struct Scene {
   OrbDepth match(const OrbFrontendOptions& options) {
     OrbDescriber describer(OrbOptions{}, make_identity_stage());
     StereoFrame frame;
-    frame.left = wall.render(0, 1);
-    frame.right = wall.render(TestWall::kBaseline_m, 2);
+    frame.set_image(0, wall.render(0, 1));
+    frame.set_image(1, wall.render(TestWall::kBaseline_m, 2));
     images.take(frame, stats);
-    describer.describe(frame.left->view(), view);
+    describer.describe(frame.left()->view(), view);
     OrbStarter(wall.camera, 40, 14).start(tracks, view, images.left(), stats);
     OrbDepth depth(wall.rig(), options);
     depth.match(tracks, images, stats);

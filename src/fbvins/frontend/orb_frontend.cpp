@@ -24,18 +24,18 @@ OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features
 OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::shared_ptr<DescriptorStage> stage)
     : options_(options),
       most_(options.max_features),
-      camera_(rig.left),
+      camera_(rig.left()),
       T_C1C0_(rig.T_C1C0()),
       images_(rig, kOrbAlignmentLevels),
-      predictor_(rig.T_BC0),
+      predictor_(rig.T_BC0()),
       describer_(extraction(options), stage, !rig.has_right()),
       improver_(std::move(stage)),
       tracks_(options.max_features + kMostUnobserved),
       matcher_(options.search_px),
-      locator_(rig.left),
-      recogniser_(rig.left, options.recognition, extraction(options).levels),
-      outliers_(rig.left, baseline_for_depths_m(rig), options.epipolar_px),
-      starter_(rig.left, options.max_features, options.min_distance_px),
+      locator_(rig.left()),
+      recogniser_(rig.left(), options.recognition, extraction(options).levels),
+      outliers_(rig.left(), baseline_for_depths_m(rig), options.epipolar_px),
+      starter_(rig.left(), options.max_features, options.min_distance_px),
       depth_(rig, options) {}
 
 TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& prior) {
@@ -52,17 +52,16 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
     tracks_.end_all(TrackStatus::out_of_view);
     drop_ended();
   }
-  out.has_left = !images_.left().empty();
-  out.has_right = images_.has_depth();
+  out.cameras = {!images_.left().empty(), images_.has_depth()};
   stats.pyramid_ms = timer.lap_ms();
   recogniser_.forget_unlocated(images_.t());
   // Without a left image tracks stay as they are; the motion to the next image spans the gap.
-  if (!out.has_left) return out;
+  if (!out.has(0)) return out;
 
   view_.t = images_.t();
   view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
-  const ImageView left = packet.frame.left->view();
+  const ImageView left = packet.frame.left()->view();
   bool detected = true;
   if (images_.has_before()) {
     detected = follow(left, stats);
@@ -77,7 +76,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   detection_.pass(detected, stats.tracked + stats.detected);
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
-  if (out.has_right) {
+  if (out.has(1)) {
     depth_.place(predictor_.at_exposures(T_C1C0_, images_.t(), images_.t_right()));
     depth_.match(tracks_, images_, stats);
   }

@@ -52,20 +52,20 @@ TEST(OrbFrontend, FollowsAWallThroughWideLensesAndSeesItsDepth) {
                   unified = UnifiedRadtan{270, 270, 187.5, 119.5, 0.8, -0.05, 0.01, 0.0005, 0.0005};
   for (const auto& [left, right] : {std::pair(double_sphere, extended), {extended, unified}, {unified, double_sphere}}) {
     StereoRig rig = make_rig();
-    rig.left = Camera(left, kWidth, kHeight), rig.right = Camera(right, kWidth, kHeight);
+    rig.cameras[0].camera = Camera(left, kWidth, kHeight), rig.cameras[1].camera = Camera(right, kWidth, kHeight);
     const World wall(rig);
     std::vector<SensorPacket> input;
     for (int k = 0; k < 6; ++k) input.push_back(wall.packet(k));
     const auto frames = run(input, small_options(), rig);
-    for (std::size_t k = 1; k < frames.size(); ++k) EXPECT_GT(frames[k].stats.tracked, 40) << rig.left.model_name() << k;
-    EXPECT_LT(median_error_px(frames), 0.15) << rig.left.model_name();
+    for (std::size_t k = 1; k < frames.size(); ++k) EXPECT_GT(frames[k].stats.tracked, 40) << rig.left().model_name() << k;
+    EXPECT_LT(median_error_px(frames), 0.15) << rig.left().model_name();
     std::vector<double> depths_m;
     for (const TrackedFrame& frame : frames)
       for (const TrackedFeature& f : frame.features)
         if (f.right) depths_m.push_back(0.11 / (f.left->normalised - f.right->normalised).x());
-    ASSERT_GT(depths_m.size(), 150u) << rig.left.model_name();
+    ASSERT_GT(depths_m.size(), 150u) << rig.left().model_name();
     std::nth_element(depths_m.begin(), depths_m.begin() + std::ssize(depths_m) / 2, depths_m.end());
-    EXPECT_NEAR(depths_m[depths_m.size() / 2], kDepth_m, 0.03) << rig.left.model_name();
+    EXPECT_NEAR(depths_m[depths_m.size() / 2], kDepth_m, 0.03) << rig.left().model_name();
   }
 }
 
@@ -88,7 +88,7 @@ TEST(OrbFrontend, ObservationsAreConsistent) {
   const auto frames = run({packets().begin(), packets().begin() + 3});
   for (const TrackedFeature& f : frames.back().features) {
     Mat2 J;
-    EXPECT_LT((world().rig.left.distort(f.left->normalised, &J) - f.left->pixel).norm(), 1e-6);
+    EXPECT_LT((world().rig.left().distort(f.left->normalised, &J) - f.left->pixel).norm(), 1e-6);
     EXPECT_LT((f.left->sqrt_information - J / small_options().sigma_px).norm(), 1e-9);
   }
 }
@@ -107,8 +107,8 @@ TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
   for (const bool missing : {true, false}) {
     std::vector<SensorPacket> input = packets();
     for (std::size_t k = 5; k < 8; ++k) {
-      input[k].frame.left = missing ? nullptr : std::make_shared<const Image>(kWidth, kHeight);
-      input[k].frame.right = nullptr;
+      input[k].frame.set_image(0, missing ? nullptr : std::make_shared<const Image>(kWidth, kHeight));
+      input[k].frame.set_image(1, nullptr);
     }
     const auto frames = run(input);
     for (std::size_t k = 5; k < 8; ++k) EXPECT_TRUE(frames[k].features.empty()) << k;
@@ -121,7 +121,7 @@ TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
 
 TEST(OrbFrontend, WithoutRightImageThereIsNoStereo) {
   std::vector<SensorPacket> input(packets().begin(), packets().begin() + 4);
-  for (SensorPacket& p : input) p.frame.right = nullptr;
+  for (SensorPacket& p : input) p.frame.set_image(1, nullptr);
   const auto frames = run(input);
   EXPECT_EQ(frames.back().stats.stereo, 0);
   EXPECT_GT(frames.back().stats.tracked, 40);
@@ -129,7 +129,7 @@ TEST(OrbFrontend, WithoutRightImageThereIsNoStereo) {
 
 TEST(OrbFrontend, WrongSizeTimeJumpsAndNoImuAreHarmless) {
   std::vector<SensorPacket> input(packets().begin(), packets().begin() + 6);
-  input[2].frame.left = std::make_shared<const Image>(100, 80, std::uint8_t{90});
+  input[2].frame.set_image(0, std::make_shared<const Image>(100, 80, std::uint8_t{90}));
   input[3].imu.samples.clear();
   input[4].frame.t = input[4].frame.t + Duration::from_seconds(5);  // a gap
   input[5].frame.t = input[0].frame.t;                              // backwards
@@ -161,15 +161,15 @@ TEST(OrbFrontend, HasNoFeatureInTheMask) {
   Image left(kWidth, kHeight, 255), right(kWidth, kHeight, 255);
   hide(left, MaskRectangle{150, 0, 60, kHeight});
   hide(right, MaskCircle{250, 120, 40});
-  rig.left.set_mask(std::make_shared<const Mask>(left));
-  rig.right.set_mask(std::make_shared<const Mask>(right));
+  rig.cameras[0].camera.set_mask(std::make_shared<const Mask>(left));
+  rig.cameras[1].camera.set_mask(std::make_shared<const Mask>(right));
   int in_right = 0;
   for (const TrackedFrame& frame : run(packets(), small_options(), rig)) {
     EXPECT_GT(frame.features.size(), 40u);
     for (const TrackedFeature& feature : frame.features) {
-      EXPECT_FALSE(rig.left.hidden(feature.left->pixel, kPatchBorder_px));
+      EXPECT_FALSE(rig.left().hidden(feature.left->pixel, kPatchBorder_px));
       if (!feature.right) continue;
-      EXPECT_FALSE(rig.right.hidden(feature.right->pixel, kPatchBorder_px));
+      EXPECT_FALSE(rig.right().hidden(feature.right->pixel, kPatchBorder_px));
       ++in_right;
     }
   }

@@ -24,9 +24,9 @@ struct Scene {
     OrbDescriber describer(OrbOptions{}, make_identity_stage());
     for (const double x_m : {0.0, kStep_m}) {
       StereoFrame frame;
-      frame.left = wall.render(x_m, x_m > 0 ? 2 : 1);
+      frame.set_image(0, wall.render(x_m, x_m > 0 ? 2 : 1));
       images.take(frame, stats);
-      describer.describe(frame.left->view(), view);
+      describer.describe(frame.left()->view(), view);
       if (x_m > 0) break;
       OrbStarter(wall.camera, 30, 14).start(tracks, view, images.left(), stats);
       for (OrbTrack& track : tracks) {

@@ -57,7 +57,7 @@ Tally run(const std::filesystem::path& folder, int max_frames) {
       if (!f.right) continue;
       const Vec3 line = E * f.left->normalised.homogeneous();
       tally.epipolar_px.push_back(std::abs(f.right->normalised.homogeneous().dot(line)) / line.head<2>().norm() *
-                                  data.rig().right.focal_px());
+                                  data.rig().right().focal_px());
     }
   }
   return tally;

@@ -114,8 +114,8 @@ class Sweep {
         const double t_s = k * kFramePeriod_s;
         p.id = FrameId{k};
         p.frame.t = Time{} + Duration::from_seconds(t_s);
-        p.frame.left = wall_.render(x_m(t_s), static_cast<std::uint64_t>(2 * k));
-        p.frame.right = wall_.render(x_m(t_s) + TestWall::kBaseline_m, static_cast<std::uint64_t>(2 * k + 1));
+        p.frame.set_image(0, wall_.render(x_m(t_s), static_cast<std::uint64_t>(2 * k)));
+        p.frame.set_image(1, wall_.render(x_m(t_s) + TestWall::kBaseline_m, static_cast<std::uint64_t>(2 * k + 1)));
         for (int i = 0; k > 0 && i <= 10; ++i) {
           const double s = t_s - kFramePeriod_s + 0.005 * i;
           p.imu.samples.push_back({Time{} + Duration::from_seconds(s), Vec3::Zero(), Vec3(a_mps2(s), 0, 9.81)});

@@ -2,7 +2,7 @@
 // Predicted motion of the left camera between two images, from the gyro and, when the estimator has a state, from
 // that state propagated by the IMU. For guided matching and outlier checks; never a measurement of the estimator.
 //
-//   MotionPredictor predictor(rig.T_BC0);
+//   MotionPredictor predictor(rig.T_BC0());
 //   predictor.add(packet.imu, prior);
 //   CameraMotion motion = predictor.between(t_then, t_now);
 //   Vec3 ray_now = motion.R_ba * ray_then;      // + motion.p_ba / depth, if motion.has_translation

@@ -22,7 +22,7 @@ std::optional<Vec2> rectify(const Mat3& R, const Vec2& normalised) {
 }  // namespace
 
 RectifiedPair::RectifiedPair(const StereoRig& rig, double min_depth_m, double epipolar_px)
-    : min_depth_m_(min_depth_m), epipolar_px_(epipolar_px), focal_px_(rig.right.focal_px()) {
+    : min_depth_m_(min_depth_m), epipolar_px_(epipolar_px), focal_px_(rig.right().focal_px()) {
   place(rig.T_C1C0());
 }
 

@@ -17,17 +17,6 @@ CameraPair cameras_of(const CameraGroup& group) {
   return {static_cast<std::int8_t>(group.first), static_cast<std::int8_t>(group.second.value_or(group.first))};
 }
 
-/// Whether a usable image of the camera came.
-void set_seen(TrackedFrame& frame, int camera, bool seen) {
-  if (camera == 0) frame.has_left = seen;
-  else if (camera == 1) frame.has_right = seen;
-  else {
-    const auto at = static_cast<std::size_t>(camera - 2);
-    if (frame.has_more.size() <= at) frame.has_more.resize(at + 1, false);
-    frame.has_more[at] = seen;
-  }
-}
-
 /// Sums; brightness and motion are those of the group with the most tracks.
 void add(FrontendStats& sum, const FrontendStats& of_group) {
   if (of_group.tracked > sum.tracked || sum.mean_brightness_left == 0) {
@@ -64,8 +53,8 @@ TrackedFrame RigFrontend::process(const SensorPacket& packet, const StatePrior& 
     frontends_[k]->follow_at_most(budget_.of(k));
     TrackedFrame frame = frontends_[k]->process(of_group(packet, groups_[k]), prior);
     budget_.note(k, static_cast<int>(frame.features.size()));
-    set_seen(out, groups_[k].first, frame.has_left);
-    if (groups_[k].second) set_seen(out, *groups_[k].second, frame.has_right);
+    out.set_has(groups_[k].first, frame.has(0));
+    if (groups_[k].second) out.set_has(*groups_[k].second, frame.has(1));
     take_features(std::move(frame.features), k, out.features);
     add(out.stats, frame.stats);
   }

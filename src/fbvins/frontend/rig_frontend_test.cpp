@@ -20,7 +20,8 @@ double x_m(int k) { return 0.01 * k; }
 StereoRig two_pairs() {
   StereoRig rig = TestWall{}.rig();
   const Pose<B, B> turned(so3_exp(Vec3(0, std::numbers::pi, 0)), Vec3::Zero());
-  rig.more = {{rig.left, turned * rig.T_BC0}, {rig.right, turned * rig.T_BC1.cast_frames<B, C0>()}};
+  rig.cameras.insert(rig.cameras.end(),
+                     {{rig.left(), turned * rig.T_BC0()}, {rig.right(), turned * rig.T_BC1().cast_frames<B, C0>()}});
   return rig;
 }
 
@@ -32,8 +33,8 @@ SensorPacket packet(int k, bool front = true, bool back = true) {
   SensorPacket p;
   p.id = FrameId{k};
   p.frame.t = Time{50'000'000LL * k};
-  if (front) p.frame.left = at(x_m(k), seed), p.frame.right = at(x_m(k) + TestWall::kBaseline_m, seed + 1);
-  if (back) p.frame.more = {at(-x_m(k), seed + 2), at(-x_m(k) + TestWall::kBaseline_m, seed + 3)};
+  if (front) p.frame.images = {at(x_m(k), seed), at(x_m(k) + TestWall::kBaseline_m, seed + 1)};
+  if (back) p.frame.set_image(2, at(-x_m(k), seed + 2)), p.frame.set_image(3, at(-x_m(k) + TestWall::kBaseline_m, seed + 3));
   for (int i = 0; k > 0 && i <= 10; ++i)
     p.imu.samples.push_back({Time{p.frame.t.ns - 50'000'000 + 5'000'000 * i}, Vec3::Zero(), Vec3(0, 0, 9.81)});
   return p;
@@ -58,8 +59,7 @@ TEST_P(RigFrontendOf, EachPairHasItsFeatures) {
   std::map<TrackId, int> cameras;
   for (int k = 0; k < 6; ++k) {
     const TrackedFrame frame = frontend_->process(packet(k), {});
-    EXPECT_TRUE(frame.has_left && frame.has_right);
-    EXPECT_EQ(frame.has_more, (std::vector<bool>{true, true}));
+    EXPECT_EQ(frame.cameras, (std::vector<bool>{true, true, true, true}));
     std::map<int, int> count = features_by_camera(frame);
     for (int c = 0; c < 4; ++c) EXPECT_GT(count[c], 30) << "camera " << c << ", image " << k;
     for (const TrackedFeature& f : frame.features) {
@@ -74,8 +74,7 @@ TEST_P(RigFrontendOf, EachPairHasItsFeatures) {
 TEST_P(RigFrontendOf, APairWithoutImagesLeavesTheOtherAlone) {
   for (int k = 0; k < 3; ++k) (void)frontend_->process(packet(k), {});
   const TrackedFrame blind = frontend_->process(packet(3, false, true), {});
-  EXPECT_FALSE(blind.has_left || blind.has_right);
-  EXPECT_EQ(blind.has_more, (std::vector<bool>{true, true}));
+  EXPECT_EQ(blind.cameras, (std::vector<bool>{false, false, true, true}));
   std::map<int, int> count = features_by_camera(blind);
   EXPECT_EQ(count[0] + count[1], 0);
   EXPECT_GT(count[2], 30);

@@ -3,7 +3,7 @@
 // the line delay of its shutter, the rotation of its mounting and the gyroscope's bias (docs/derivations/gyro_alignment.md,
 // Y1-Y6).
 //
-//   GyroAlignment alignment(rig.T_BC0.R(), {});
+//   GyroAlignment alignment(rig.T_BC0().R(), {});
 //   alignment.add(frame);                                   // each tracked frame
 //   if (const auto found = alignment.solve()) use(found->time_offset_s, found->time_offset_sigma_s());
 //

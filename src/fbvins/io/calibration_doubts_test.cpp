@@ -29,7 +29,7 @@ TEST(CalibrationDoubts, ASensorInUseHasNone) {
 
 TEST(CalibrationDoubts, OtherUnitsAreAskedAbout) {
   StereoRig r = rig();
-  r.right.set_own_times({-4.5, 0});
+  r.cameras[1].camera.set_own_times({-4.5, 0});
   EXPECT_NE(doubt(r).find("camera 1's time offset is -4.5 s: is it in milliseconds"), std::string::npos) << doubt(r);
   r = rig();
   r.line_delay_s = -3e-5;

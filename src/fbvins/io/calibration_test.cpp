@@ -57,7 +57,7 @@ TEST(Calibration, OurBodyIsTheImuEvenWhereThatOfTheFileIsNot) {
   imu.T_BS = Pose<B, B>(so3_exp({0.3, 0.2, 0.1}), {1, 2, 3});
   const auto rig = join_euroc({*left, *right}, imu, "x");
   ASSERT_TRUE(rig);
-  expect_same(imu.T_BS * rig->T_BC0.cast_frames<B, B>(), kLeft, 1e-13);
+  expect_same(imu.T_BS * rig->T_BC0().cast_frames<B, B>(), kLeft, 1e-13);
   expect_same(rig->T_C1C0(), kRight.inverse() * kLeft, 1e-13);
 }
 
@@ -68,10 +68,10 @@ TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
   for (const std::string& text : {direct, chained}) {
     const auto rig = parse_kalibr_camchain({"chain.yaml", text});
     ASSERT_TRUE(rig) << rig.error().message;
-    expect_same(rig->T_BC0, kLeft, 1e-14);
-    expect_same(rig->T_BC1, kRight, 1e-14);
+    expect_same(rig->T_BC0(), kLeft, 1e-14);
+    expect_same(rig->T_BC1(), kRight, 1e-14);
     EXPECT_EQ(rig->time_offset_s, -0.004);
-    EXPECT_EQ(rig->right.width(), 752);
+    EXPECT_EQ(rig->right().width(), 752);
   }
 }
 
@@ -103,13 +103,13 @@ TEST(Calibration, KalibrsWideLensesHaveTheirNumbersBeforeTheFocalLengths) {
              omni = rig_with("omni", "0.8", kRadtan), plain = rig_with("omni", "1", kNone);
   for (const auto* rig : {&ds, &eucm, &omni, &plain}) {
     ASSERT_TRUE(*rig) << rig->error().message;
-    EXPECT_EQ((*rig)->left.intrinsics(), (std::array{458.6, 457.2, 367.2, 248.3}));
+    EXPECT_EQ((*rig)->left().intrinsics(), (std::array{458.6, 457.2, 367.2, 248.3}));
   }
-  EXPECT_EQ(ds->left.model_name(), "ds");
-  EXPECT_EQ(ds->left.distortion(), (std::vector{-0.2, 0.59}));
-  EXPECT_EQ(std::get<ExtendedUnified>(eucm->left.model()).beta, 1.1);
-  EXPECT_EQ(omni->left.distortion(), (std::vector{0.8, -0.3, 0.1, 0.001, 0.002}));
-  EXPECT_EQ(plain->left.distortion(), (std::vector{1.0, 0.0, 0.0, 0.0, 0.0}));
+  EXPECT_EQ(ds->left().model_name(), "ds");
+  EXPECT_EQ(ds->left().distortion(), (std::vector{-0.2, 0.59}));
+  EXPECT_EQ(std::get<ExtendedUnified>(eucm->left().model()).beta, 1.1);
+  EXPECT_EQ(omni->left().distortion(), (std::vector{0.8, -0.3, 0.1, 0.001, 0.002}));
+  EXPECT_EQ(plain->left().distortion(), (std::vector{1.0, 0.0, 0.0, 0.0, 0.0}));
   EXPECT_NE(rig_with("ds", "1.5, 0.5", kNone).error().message.find("intrinsics: xi is 1.5, not between -1 and 1"),
             std::string::npos);
   EXPECT_NE(rig_with("eucm", "0.6, -1", kNone).error().message.find("beta is -1, not between 0 and 100"), std::string::npos);
@@ -201,8 +201,8 @@ TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
 
 TEST(Calibration, KalibrsImuMayLieInTheFileOfTheCameras) {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   const KalibrFiles files(rig);
   ImuNoise otherwise;
   otherwise.rate_hz = 100;
@@ -230,7 +230,7 @@ TEST(Calibration, EachCameraHasItsTimes) {
   EXPECT_EQ(two.line_delay_s, 2e-5);
   EXPECT_DOUBLE_EQ(two.times(1).time_offset_s, 0.001);
   EXPECT_DOUBLE_EQ(two.times(1).line_delay_s, 3e-5);
-  EXPECT_EQ(kalibr("  line_delay: 2e-05\n").right.own_times(), CameraTimes{}) << "without a time offset that of cam0";
+  EXPECT_EQ(kalibr("  line_delay: 2e-05\n").right().own_times(), CameraTimes{}) << "without a time offset that of cam0";
   const auto euroc = [](const std::string& of_cam0, const std::string& of_cam1) {
     return *join_euroc({*parse_euroc_camera({"cam0", euroc_camera(kLeft) + of_cam0}),
                         *parse_euroc_camera({"cam1", euroc_camera(kRight) + of_cam1})},
@@ -240,7 +240,7 @@ TEST(Calibration, EachCameraHasItsTimes) {
   EXPECT_EQ(folder.times(0), (CameraTimes{0.01, 0}));
   EXPECT_DOUBLE_EQ(folder.times(1).time_offset_s, 0.012);
   EXPECT_DOUBLE_EQ(folder.times(1).line_delay_s, 25e-6);
-  EXPECT_EQ(euroc("timeshift_cam_imu: 0.01\n", "").right.own_times(), CameraTimes{});
+  EXPECT_EQ(euroc("timeshift_cam_imu: 0.01\n", "").right().own_times(), CameraTimes{});
 }
 
 }  // namespace calibration_test

@@ -115,12 +115,12 @@ std::string folder_with_a_step(const std::string& name) {
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 31.5, 23.5, 0, 0, 0, 0}, 64, 48);
-  rig.T_BC1.p.x() = 0.1;
+  rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 31.5, 23.5, 0, 0, 0, 0}, 64, 48), {}});
+  rig.cameras[1].T_BC.p.x() = 0.1;
   auto recording = EurocFolder::create(folder, rig, "made by hand");
   EXPECT_TRUE(recording.ok());
   const auto image = std::make_shared<const Image>(64, 48, std::uint8_t{90});
-  for (int i = 0; i < 40; ++i) EXPECT_TRUE(recording->add({Time{i * 50 * kMs + 1}, image, image}, Time{i * 50 * kMs + 1}).ok());
+  for (int i = 0; i < 40; ++i) EXPECT_TRUE(recording->add({Time{i * 50 * kMs + 1}, {image, image}}, Time{i * 50 * kMs + 1}).ok());
   std::vector<ImuSample> readings;
   for (int i = 0; i < 400; ++i) readings.push_back({Time{i * 5 * kMs + 1}, Vec3(1e-6 * i, 0, 0), Vec3(0, 0, 9.81)});
   EXPECT_TRUE(recording->finish(readings, {}).ok());

@@ -19,12 +19,12 @@ class OneCamera : public FrameLoader {
   OneCamera(std::unique_ptr<FrameLoader> both, bool right) : both_(std::move(both)), right_(right) {}
 
   LoadedFrame load(const FrameEntry& entry) override {
-    FrameEntry one = entry;  // whose left file is the camera's
-    if (right_) std::swap(one.left_file, one.right_file);
+    if (!right_) return both_->load(entry);
+    FrameEntry one = entry;  // whose only file is the camera's
+    one.files.insert(one.files.begin(), "");
     LoadedFrame out = both_->load(one);
-    if (!right_) return out;
-    std::swap(out.frame.left, out.frame.right);
-    std::swap(out.left, out.right);
+    out.frame.swap_left_right();
+    out.cameras = {out.of(1)};
     return out;
   }
 
@@ -41,9 +41,9 @@ DatasetContents with_cameras(DatasetContents contents, const std::string& camera
     for (FrameEntry& frame : contents.frames) frame.depth_file.clear();
   }
   if (camera == "all" || camera == "depth" || !contents.rig.has_right()) return contents;
-  contents.rig.more.clear();
-  contents.info.more = {};
-  for (FrameEntry& frame : contents.frames) frame.more_files.clear();
+  contents.rig.cameras.resize(2);
+  contents.info.cameras.resize(2);
+  for (FrameEntry& frame : contents.frames) frame.files.resize(2);
   if (camera == "both") {
     std::erase_if(contents.frames, [](const FrameEntry& frame) { return frame.without_images(); });
     return contents;
@@ -51,14 +51,12 @@ DatasetContents with_cameras(DatasetContents contents, const std::string& camera
   const bool right = camera == "right";
   contents.rig = with_one_camera(contents.rig, right);
   for (FrameEntry& frame : contents.frames) {
-    if (right) frame.left_file = std::move(frame.right_file);
+    frame.files = {frame.files[right ? 1 : 0]};
     if (right) frame.t = frame.t + frame.offsets.of(1);
-    frame.right_file.clear();
     frame.offsets = {};
   }
-  std::erase_if(contents.frames, [](const FrameEntry& frame) { return frame.left_file.empty(); });
-  if (right) contents.info.left = std::move(contents.info.right);
-  contents.info.right = {};
+  std::erase_if(contents.frames, [](const FrameEntry& frame) { return frame.without_images(); });
+  contents.info.cameras = {contents.info.cameras[right ? 1 : 0]};
   contents.loader = std::make_unique<OneCamera>(std::move(contents.loader), right);
   return contents;
 }
@@ -128,20 +126,15 @@ std::optional<StereoFrame> Dataset::next_frame() {
 
 void Dataset::count(const LoadedFrame& loaded) {
   DatasetInfo& info = contents_.info;
-  for (auto [total, here] : {std::pair{&info.left.images, &loaded.left},
-                             {&info.right.images, &loaded.right},
-                             {&info.more.images, &loaded.more},
-                             {&info.depth.images, &loaded.depth}}) {
-    total->corrupt += here->corrupt;
-    total->wrong_size += here->wrong_size;
-  }
+  ImageCounts now = loaded.depth;
+  info.depth.images += loaded.depth;
+  for (std::size_t i = 0; i < loaded.cameras.size(); ++i)
+    info.camera(static_cast<int>(i)).images += loaded.cameras[i], now += loaded.cameras[i];
   if (loaded.frame.without_images()) ++info.frames_without_image;
   // One sentence for the first of them; the counts say how many.
-  int failures = 0;
-  for (const ImageCounts& of : {info.left.images, info.right.images, info.more.images, info.depth.images})
-    failures += of.corrupt + of.wrong_size;
-  const int now = loaded.left.bad() + loaded.right.bad() + loaded.more.bad() + loaded.depth.bad();
-  if (now > 0 && failures == now) info.warnings.push_back(loaded.problem);
+  ImageCounts all = info.depth.images;
+  for (const CameraInfo& camera : info.cameras) all += camera.images;
+  if (now.bad() > 0 && all.corrupt + all.wrong_size == now.bad()) info.warnings.push_back(loaded.problem);
 }
 
 Error no_depth_images(const std::string& path) {

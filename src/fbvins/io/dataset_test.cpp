@@ -39,8 +39,8 @@ Tally drain(Dataset& data) {
       EXPECT_GT(frame.t, image);
       image = frame.t;
       ++tally.frames;
-      tally.left += frame.left != nullptr;
-      tally.right += frame.right != nullptr;
+      tally.left += frame.left() != nullptr;
+      tally.right += frame.right() != nullptr;
       if (imu < frame.t) ++tally.late_imu;
     }
   }
@@ -62,7 +62,7 @@ TEST(RealData, MachineHallIsReadWhole) {
   EXPECT_EQ(info.first_image.ns, 1403636584763555584);
   EXPECT_TRUE(info.warnings.empty()) << info.warnings.front();
   EXPECT_NEAR((*data)->rig().T_C1C0().p.norm(), 0.11, 0.001);
-  EXPECT_EQ((*data)->rig().left.width(), 752);
+  EXPECT_EQ((*data)->rig().left().width(), 752);
   EXPECT_DOUBLE_EQ((*data)->rig().imu_noise.gyro_noise_density_radps_rthz, 1.6968e-4);
   const Tally tally = drain(**data);
   EXPECT_EQ(tally.frames, 340);
@@ -100,7 +100,7 @@ TEST(DatasetTest, AnImuThatIsTooSlowIsSaid) {
   const auto said = [](int hz, double declared_hz) {
     DatasetContents contents;
     contents.rig.imu_noise.rate_hz = declared_hz;
-    contents.frames.push_back({Time{0}, "a", "b"});
+    contents.frames.push_back({Time{0}, {"a"}});
     for (int i = 0; i < 100; ++i) contents.imu.push_back({Time{i * (1'000'000'000LL / hz)}, Vec3::Zero(), Vec3::Zero()});
     describe(contents);
     std::string out;

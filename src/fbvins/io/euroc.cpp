@@ -198,15 +198,14 @@ class EurocReader {
   Result<void> read_frames() {
     std::vector<std::vector<ImageRow>> lists;
     DatasetInfo& info = out_.info;
-    for (std::size_t i = 0; i < cameras_.size(); ++i)
-      lists.push_back(taken(rows_.cameras[i], i == 0 ? info.left : i == 1 ? info.right : info.more));
+    for (std::size_t i = 0; i < cameras_.size(); ++i) lists.push_back(taken(rows_.cameras[i], info.camera(static_cast<int>(i))));
     const std::vector<ImageRow> depths = taken(rows_.depth, info.depth);
     out_.frames = join_images(std::move(lists), depths, own_offsets(out_.rig), options_.pair_tolerance_ms, info);
     const auto never = [&](const std::string& folder) {
       return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam{}'s",
                                                      named(folder + "data.csv"), options_.pair_tolerance_ms, cameras_[0])};
     };
-    if (cameras_.size() > 1 && info.left.unpaired == info.left.listed) return never(folder_of(cameras_[1]));
+    if (cameras_.size() > 1 && info.cameras[0].unpaired == info.cameras[0].listed) return never(folder_of(cameras_[1]));
     if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(std::string(kDepthFolder));
     if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
       return Error{cut.error().code, fmt::format("{}: {}", named(folders().front() + "data.csv"), cut.error().message)};
@@ -230,19 +229,16 @@ class EurocReader {
     };
     for (FrameEntry& frame : out_.frames) {
       const std::vector<std::string> in = folders();
-      look(frame.left_file, in[0] + "data/", out_.info.left.images);
-      if (in.size() > 1) look(frame.right_file, in[1] + "data/", out_.info.right.images);
+      for (int i = 0; i < static_cast<int>(in.size()); ++i)
+        look(frame.file(i), in[static_cast<std::size_t>(i)] + "data/", out_.info.camera(i).images);
       look(frame.depth_file, depth("data/"), out_.info.depth.images);
-      for (std::size_t i = 0; i < frame.more_files.size(); ++i)
-        look(frame.more_files[i], in[i + 2] + "data/", out_.info.more.images);
     }
     const std::size_t emptied = std::erase_if(out_.frames, [](const FrameEntry& f) { return f.without_images(); });
     out_.info.frames_without_image = static_cast<int>(emptied);
     if (out_.frames.empty())
       return Error{ErrorCode::not_found, fmt::format("{}: no such file, nor any other of the images listed", first_missing)};
-    int missing = 0;
-    for (const CameraInfo* of : {&out_.info.left, &out_.info.right, &out_.info.more, &out_.info.depth})
-      missing += of->images.missing;
+    int missing = out_.info.depth.images.missing;
+    for (const CameraInfo& camera : out_.info.cameras) missing += camera.images.missing;
     if (missing > 0) warn(fmt::format("{}: no such file; {} of the images listed are missing", first_missing, missing));
     return {};
   }

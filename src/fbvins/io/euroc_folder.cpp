@@ -139,24 +139,22 @@ struct Images {
 /// Writes a frame's images, of the cameras that delivered one; may run while the next frame is made.
 Result<void> write_images(const Images& images, const fs::path& mav0) {
   const StereoFrame& frame = images.frame;
-  const std::string left = fmt::format("{}.png", frame.t.ns), right = fmt::format("{}.png", images.right_stamp.ns);
-  if (frame.left)
-    if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*frame.left)); !done) return done;
+  const std::string left = fmt::format("{}.png", frame.t.ns);
+  for (int i = 0; i < static_cast<int>(frame.images.size()); ++i) {
+    const Time stamp = i == 1 ? images.right_stamp : frame.t + frame.offsets.of(i);
+    const fs::path path = mav0 / fmt::format("cam{}/data/{}.png", i, stamp.ns);
+    if (const auto& image = frame.image(i))
+      if (Result<void> done = write_file(path, encode_png(*image)); !done) return done;
+  }
   if (!images.depth_left_m.empty()) {
-    const std::string depth = depth_png(images.depth_left_m, frame.left->width(), frame.left->height());
+    const std::string depth = depth_png(images.depth_left_m, frame.left()->width(), frame.left()->height());
     if (Result<void> done = write_file(mav0 / "depth0" / left, depth); !done) return done;
   }
   if (const DepthImage* depth = frame.depth.get(); depth != nullptr) {
     const std::string png = encode_png16(depth->mm, depth->width, depth->height);
     if (Result<void> done = write_file(mav0 / "depth0/data" / left, png); !done) return done;
   }
-  for (std::size_t i = 0; i < frame.more.size(); ++i) {
-    const Time stamp = frame.t + frame.offsets.of(static_cast<int>(i) + 2);
-    const fs::path path = mav0 / fmt::format("cam{}/data/{}.png", i + 2, stamp.ns);
-    if (frame.more[i])
-      if (Result<void> done = write_file(path, encode_png(*frame.more[i])); !done) return done;
-  }
-  return frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*frame.right)) : Result<void>{};
+  return {};
 }
 
 }  // namespace

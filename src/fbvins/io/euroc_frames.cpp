@@ -52,10 +52,8 @@ class EurocLoader : public FrameLoader {
     LoadedFrame out;
     out.frame.t = entry.t;
     out.frame.offsets = entry.offsets;
-    out.frame.left = load_image(entry.left_file, 0, out.left, out);
-    out.frame.right = load_image(entry.right_file, 1, out.right, out);
-    for (std::size_t i = 0; i < entry.more_files.size(); ++i)
-      out.frame.more.push_back(load_image(entry.more_files[i], static_cast<int>(i) + 2, out.more, out));
+    for (int i = 0; i < static_cast<int>(entry.files.size()); ++i)
+      out.frame.images.push_back(load_image(entry.file(i), i, out.of(i), out));
     out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.depth_camera(), out.depth, out);
     return out;
   }
@@ -155,21 +153,21 @@ PairedFrames pair_without_trigger(const std::vector<ImageRow>& left, const std::
   const std::vector<int> partners = partners_without_trigger(lefts, stamps_of(right), interval);
   std::vector<bool> used(right.size());
   for (std::size_t l = 0; l < left.size(); ++l) {
-    FrameEntry& frame = out.frames.emplace_back(FrameEntry{left[l].t, left[l].file, ""});
+    FrameEntry& frame = out.frames.emplace_back(FrameEntry{left[l].t, {left[l].file}});
     if (partners[l] < 0) {
       ++out.left_only;
       continue;
     }
     const auto r = static_cast<std::size_t>(partners[l]);
     used[r] = true;
-    frame.right_file = right[r].file;
+    frame.file(1) = right[r].file;
     frame.offsets.set(1, right[r].t - left[l].t);
   }
   for (std::size_t r = 0; r < right.size(); ++r) {
     if (used[r]) continue;
     ++out.right_only;
     if (std::abs((lefts[nearest(lefts, right[r].t)] - right[r].t).ns) > interval.ns)
-      out.frames.push_back({right[r].t, "", right[r].file});
+      out.frames.push_back({right[r].t, {"", right[r].file}});
   }
   std::ranges::stable_sort(out.frames, {}, &FrameEntry::t);
   return out;
@@ -225,14 +223,14 @@ PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<Im
   const auto skip_right = [&](std::size_t next_left) {
     const bool before_free = next_left == 0 || right[r].t > left[next_left - 1].t + half_interval;
     const bool after_free = next_left == left.size() || right[r].t + half_interval < left[next_left].t;
-    if (before_free && after_free) out.frames.push_back({right[r].t, "", right[r].file});
+    if (before_free && after_free) out.frames.push_back({right[r].t, {"", right[r].file}});
     ++r, ++out.right_only;
   };
   for (std::size_t l = 0; l < left.size(); ++l) {
     while (r < right.size() && right[r].t < left[l].t && distance(l, r) > tolerance.ns) skip_right(l);
     while (r + 1 < right.size() && distance(l, r + 1) < distance(l, r)) skip_right(l);
     const bool paired = r < right.size() && distance(l, r) <= tolerance.ns;
-    out.frames.push_back({left[l].t, left[l].file, paired ? right[r].file : ""});
+    out.frames.push_back({left[l].t, {left[l].file, paired ? right[r].file : ""}});
     paired ? ++r : ++out.left_only;
   }
   while (r < right.size()) skip_right(left.size());
@@ -260,18 +258,17 @@ int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& imag
   return unpaired;
 }
 
-int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance) {
+int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, int camera, Duration tolerance) {
   const std::vector<Time> stamps = stamps_of(frames);
   const Duration interval = measure_intervals(stamps).median, half_interval{interval.ns / 2};
   if (half_interval.ns > 0) tolerance.ns = std::min(tolerance.ns, half_interval.ns);
-  for (FrameEntry& frame : frames) frame.more_files.resize(more + 1);
   if (interval.ns > 0 && without_trigger(stamps, stamps_of(images), tolerance, interval)) {
     const std::vector<int> partners = partners_without_trigger(stamps, stamps_of(images), interval);
     for (std::size_t k = 0; k < frames.size(); ++k) {
       if (partners[k] < 0) continue;
       const ImageRow& image = images[static_cast<std::size_t>(partners[k])];
-      frames[k].more_files[more] = image.file;
-      frames[k].offsets.set(static_cast<int>(more) + 2, image.t - frames[k].t);
+      frames[k].file(camera) = image.file;
+      frames[k].offsets.set(camera, image.t - frames[k].t);
     }
     return static_cast<int>(images.size()) - static_cast<int>(std::ranges::count_if(partners, [](int i) { return i >= 0; }));
   }
@@ -281,15 +278,15 @@ int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& ima
     if (!stamps.empty()) {
       FrameEntry& frame = frames[nearest(stamps, image.t)];
       const Duration distance{std::abs((image.t - frame.t).ns)};
-      if (distance <= tolerance && frame.more_files[more].empty()) {
-        frame.more_files[more] = image.file;
+      if (distance <= tolerance && frame.file(camera).empty()) {
+        frame.file(camera) = image.file;
         continue;
       }
       ++unpaired;
       if (distance <= half_interval) continue;
     }
-    alone.push_back({image.t, "", "", std::nullopt, std::vector<std::string>(more + 1)});
-    alone.back().more_files[more] = image.file;
+    alone.push_back({image.t});
+    alone.back().file(camera) = image.file;
   }
   frames.insert(frames.end(), std::make_move_iterator(alone.begin()), std::make_move_iterator(alone.end()));
   std::ranges::stable_sort(frames, {}, &FrameEntry::t);
@@ -304,18 +301,19 @@ std::vector<FrameEntry> join_images(std::vector<std::vector<ImageRow>> cameras, 
   const auto warn = [&](std::string sentence) { info.warnings.push_back(std::move(sentence)); };
   const bool has_right = cameras.size() > 1;
   PairedFrames paired = pair_frames(cameras[0], has_right ? cameras[1] : std::vector<ImageRow>{}, tolerance);
-  info.left.unpaired = has_right ? paired.left_only : 0;
-  info.right.unpaired = paired.right_only;
+  info.camera(0).unpaired = has_right ? paired.left_only : 0;
+  info.camera(1).unpaired = paired.right_only;
   if (paired.untriggered) warn(untriggered_sentence(paired.frames, 1, tolerance_ms));
-  else if (info.left.unpaired + info.right.unpaired > 0)
-    warn(fmt::format("{} left and {} right images have no partner within {} ms", info.left.unpaired, info.right.unpaired,
+  else if (info.camera(0).unpaired + info.camera(1).unpaired > 0)
+    warn(fmt::format("{} left and {} right images have no partner within {} ms", info.camera(0).unpaired, info.camera(1).unpaired,
                      tolerance_ms));
   std::vector<FrameEntry> frames = std::move(paired.frames);
   if (!frames.empty()) info.depth.unpaired = add_depth(frames, depth, tolerance);
   if (info.depth.unpaired > 0) warn(fmt::format("{} depth images have no image within {} ms", info.depth.unpaired, tolerance_ms));
-  for (std::size_t i = 2; i < cameras.size(); ++i) info.more.unpaired += add_camera(frames, cameras[i], i - 2, tolerance);
-  if (info.more.unpaired > 0)
-    warn(fmt::format("{} images of further cameras have no partner within {} ms", info.more.unpaired, tolerance_ms));
+  for (int i = 2; i < static_cast<int>(cameras.size()); ++i)
+    info.camera(i).unpaired = add_camera(frames, cameras[static_cast<std::size_t>(i)], i, tolerance);
+  if (const int unpaired = info.further().unpaired; unpaired > 0)
+    warn(fmt::format("{} images of further cameras have no partner within {} ms", unpaired, tolerance_ms));
   for (FrameEntry& frame : frames) frame.offsets -= own;
   return frames;
 }

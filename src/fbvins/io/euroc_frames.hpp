@@ -40,10 +40,10 @@ PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<Im
 /// What is said of cameras without a common trigger: `camera` and camera 0.
 std::string untriggered_sentence(const std::vector<FrameEntry>& frames, int camera, double tolerance_ms);
 
-/// Adds the images of a further camera, the `more`-th from number 2 on: each to the nearest frame within the tolerance (at most
+/// Adds the images of a further camera, from number 2 on: each to the nearest frame within the tolerance (at most
 /// half the median interval), or, farther than half the interval from all, as a frame of its own; without a common trigger as in
 /// pair_frames. Returns how many had no partner.
-int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance);
+int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, int camera, Duration tolerance);
 
 /// Gives each depth image to the nearest frame within the tolerance. Returns how many had none.
 int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, Duration tolerance);

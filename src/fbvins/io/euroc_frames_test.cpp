@@ -17,10 +17,10 @@ std::vector<ImageRow> at_ms(std::initializer_list<int> stamps) {
 TEST(PairFrames, TakesTheNearestWithinTheTolerance) {
   const PairedFrames p = pair_frames(at_ms({0, 50, 100, 150}), at_ms({1, 49, 104, 151}), Duration{3 * kMs});
   ASSERT_EQ(p.frames.size(), 4u) << "every left image is a frame";
-  EXPECT_EQ(p.frames[0].right_file, "1");
-  EXPECT_EQ(p.frames[1].right_file, "49");
-  EXPECT_EQ(p.frames[2].right_file, "") << "4 ms are too much";
-  EXPECT_EQ(p.frames[3].right_file, "151");
+  EXPECT_EQ(p.frames[0].file(1), "1");
+  EXPECT_EQ(p.frames[1].file(1), "49");
+  EXPECT_EQ(p.frames[2].file(1), "") << "4 ms are too much";
+  EXPECT_EQ(p.frames[3].file(1), "151");
   EXPECT_EQ(p.left_only, 1);
   EXPECT_EQ(p.right_only, 1);
 }
@@ -34,9 +34,9 @@ TEST(PairFrames, ARightImageServesOnce) {
 TEST(PairFrames, HalfTheIntervalBoundsAGenerousTolerance) {
   // Right is late by 30 of 50 ms: it belongs to the next left image, not to the one before.
   const PairedFrames p = pair_frames(at_ms({0, 50, 100}), at_ms({30, 80, 130}), Duration{1000 * kMs});
-  EXPECT_EQ(p.frames[0].right_file, "");
-  EXPECT_EQ(p.frames[1].right_file, "30");
-  EXPECT_EQ(p.frames[2].right_file, "80");
+  EXPECT_EQ(p.frames[0].file(1), "");
+  EXPECT_EQ(p.frames[1].file(1), "30");
+  EXPECT_EQ(p.frames[2].file(1), "80");
   EXPECT_EQ(p.right_only, 1);
 }
 
@@ -44,7 +44,7 @@ TEST(PairFrames, RightImagesAreFramesWhereLeftOnesAreMissing) {
   const PairedFrames p =
       pair_frames(at_ms({100, 150, 200, 300}), at_ms({50, 100, 150, 200, 250, 304, 350, 400}), Duration{3 * kMs});
   std::vector<std::string> frames;
-  for (const FrameEntry& f : p.frames) frames.push_back(f.left_file + "/" + f.right_file);
+  for (const FrameEntry& f : p.frames) frames.push_back(f.file(0) + "/" + f.file(1));
   EXPECT_EQ(frames, (std::vector<std::string>{"/50", "100/100", "150/150", "200/200", "/250", "300/", "/350", "/400"}));
   EXPECT_EQ(p.left_only, 1);
   EXPECT_EQ(p.right_only, 5) << "304 ms is too near to 300 ms to be an instant of its own";
@@ -53,7 +53,7 @@ TEST(PairFrames, RightImagesAreFramesWhereLeftOnesAreMissing) {
 std::vector<std::string> offsets_in(const std::vector<FrameEntry>& frames, int camera) {
   std::vector<std::string> out;
   for (const FrameEntry& f : frames)
-    out.push_back(f.left_file + "/" + f.right_file + " " + std::to_string(f.offsets.of(camera).ns / kMs));
+    out.push_back(f.file(0) + "/" + f.file(1) + " " + std::to_string(f.offsets.of(camera).ns / kMs));
   return out;
 }
 
@@ -124,32 +124,32 @@ TEST(ImuRows, GyroComesBeforeTheAccelerometer) {
 TEST(AddCamera, JoinsTheNearestFrameOrIsOneOfItsOwn) {
   std::vector<FrameEntry> frames = pair_frames(at_ms({0, 50, 100, 300}), at_ms({0, 50, 100, 300}), Duration{3 * kMs}).frames;
   // One that is late, one near none, two where the others have a gap, one of them near a frame.
-  EXPECT_EQ(add_camera(frames, at_ms({1, 52, 120, 200, 299}), 0, Duration{3 * kMs}), 2);
+  EXPECT_EQ(add_camera(frames, at_ms({1, 52, 120, 200, 299}), 2, Duration{3 * kMs}), 2);
   ASSERT_EQ(frames.size(), 5u);
-  EXPECT_FALSE(frames[0].more_files[0].empty());
-  EXPECT_FALSE(frames[1].more_files[0].empty());
-  EXPECT_TRUE(frames[2].more_files[0].empty());
-  EXPECT_TRUE(frames[3].left_file.empty() && frames[3].right_file.empty());
+  EXPECT_FALSE(frames[0].file(2).empty());
+  EXPECT_FALSE(frames[1].file(2).empty());
+  EXPECT_TRUE(frames[2].file(2).empty());
+  EXPECT_TRUE(frames[3].file(0).empty() && frames[3].file(1).empty());
   EXPECT_EQ(frames[3].t.ns, 200 * kMs);
   EXPECT_FALSE(frames[3].without_images());
-  EXPECT_FALSE(frames[4].more_files[0].empty());
+  EXPECT_FALSE(frames[4].file(2).empty());
 }
 
 TEST(AddCamera, WithoutACommonTriggerTheOffsetIsKept) {
   std::vector<FrameEntry> frames = pair_frames(at_ms({0, 50, 100, 150}), at_ms({0, 50, 100, 150}), Duration{3 * kMs}).frames;
-  EXPECT_EQ(add_camera(frames, at_ms({-15, 35, 85, 135}), 0, Duration{3 * kMs}), 0);
+  EXPECT_EQ(add_camera(frames, at_ms({-15, 35, 85, 135}), 2, Duration{3 * kMs}), 0);
   ASSERT_EQ(frames.size(), 4u);
-  EXPECT_EQ(frames[2].more_files[0], "85");
+  EXPECT_EQ(frames[2].file(2), "85");
   EXPECT_EQ(frames[2].offsets.of(2).ns, -15 * kMs);
   EXPECT_EQ(frames[2].offsets.of(1).ns, 0);
 }
 
 TEST(AddCamera, FramesOfACameraAloneAreSharedByTheNext) {
   std::vector<FrameEntry> frames = pair_frames(at_ms({0, 50, 100, 300}), {}, Duration{3 * kMs}).frames;
-  EXPECT_EQ(add_camera(frames, at_ms({200}), 0, Duration{3 * kMs}), 1);
-  EXPECT_EQ(add_camera(frames, at_ms({201}), 1, Duration{3 * kMs}), 0);
+  EXPECT_EQ(add_camera(frames, at_ms({200}), 2, Duration{3 * kMs}), 1);
+  EXPECT_EQ(add_camera(frames, at_ms({201}), 3, Duration{3 * kMs}), 0);
   ASSERT_EQ(frames.size(), 5u);
-  EXPECT_FALSE(frames[3].more_files[0].empty() || frames[3].more_files[1].empty());
+  EXPECT_FALSE(frames[3].file(2).empty() || frames[3].file(3).empty());
 }
 
 /// The right camera's stamps are 8 ms late, as its calibration says: the images are of one instant, and the offsets say what the
@@ -161,7 +161,7 @@ TEST(JoinImages, OwnOffsetsOfCamerasCountBeforeTheStamps) {
   ASSERT_EQ(frames.size(), 5u);
   std::string given;
   for (FrameEntry frame : frames) {
-    given += frame.left_file + "/" + frame.right_file + " ";
+    given += frame.file(0) + "/" + frame.file(1) + " ";
     EXPECT_EQ(frame.offsets.of(1).ns, 8 * kMs) << "of the stamp";
     frame.offsets += own;
     EXPECT_TRUE(frame.offsets.all_zero()) << "of the exposure";
@@ -169,7 +169,7 @@ TEST(JoinImages, OwnOffsetsOfCamerasCountBeforeTheStamps) {
   EXPECT_EQ(given, "0/8 50/58 100/108 /158 200/208 ");
   EXPECT_EQ(frames[3].t.ns, 150 * kMs);
   const std::vector<FrameEntry> as_stamped = join_images({at_ms({0, 50, 100}), at_ms({0, 50, 100})}, {}, own, 3, info);
-  EXPECT_EQ(as_stamped[1].right_file, "50");
+  EXPECT_EQ(as_stamped[1].file(1), "50");
   EXPECT_EQ(as_stamped[1].offsets.of(1).ns, 0) << "8 ms before the left one, which the stamps do not say";
 }
 

@@ -62,7 +62,7 @@ LoadedFrame FramePrefetcher::load(std::size_t index) {
   } catch (const std::exception& e) {
     LoadedFrame lost;
     lost.frame.t = frames_[index].t;
-    lost.left.corrupt = lost.right.corrupt = 1;
+    lost.cameras.assign(2, {.corrupt = 1});
     lost.problem = fmt::format("frame {}: {}", frames_[index].t.ns, e.what());
     return lost;
   }

@@ -11,7 +11,7 @@ namespace frame_prefetcher_test {
 
 std::vector<FrameEntry> frames(int count) {
   std::vector<FrameEntry> out;
-  for (int i = 0; i < count; ++i) out.push_back({Time{i}, "", ""});
+  for (int i = 0; i < count; ++i) out.push_back({Time{i}});
   return out;
 }
 
@@ -66,7 +66,7 @@ TEST(FramePrefetcher, ADecoderThatThrowsCostsOneFrame) {
     for (int i = 0; i < 5; ++i) {
       const auto frame = prefetcher.next();
       ASSERT_TRUE(frame);
-      EXPECT_EQ(frame->left.corrupt, i == 3 ? 1 : 0);
+      EXPECT_EQ(of_camera(frame->cameras, 0).corrupt, i == 3 ? 1 : 0);
       EXPECT_EQ(frame->problem, i == 3 ? "frame 3: no memory for this one" : "");
       EXPECT_EQ(frame->frame.t.ns, i);
     }

@@ -18,7 +18,7 @@ constexpr std::size_t kTried = 8;
 using Put = std::function<void(FrameEntry&, std::string)>;
 
 LoadedFrame load_alone(const DatasetContents& contents, const std::string& image, const Put& put) {
-  FrameEntry one_image{contents.frames.front().t, "", ""};
+  FrameEntry one_image{contents.frames.front().t};
   put(one_image, image);
   return contents.loader->load(one_image);
 }
@@ -37,10 +37,7 @@ Result<void> check_sensor(const DatasetContents& contents, const std::string& na
 }
 
 Put put_image_of(int camera) {
-  return [camera](FrameEntry& f, std::string image) {
-    if (camera > 1) f.more_files.resize(static_cast<std::size_t>(camera - 1));
-    (camera == 0 ? f.left_file : camera == 1 ? f.right_file : f.more_files.back()) = std::move(image);
-  };
+  return [camera](FrameEntry& f, std::string image) { f.file(camera) = std::move(image); };
 }
 
 Result<void> check_camera(const DatasetContents& contents, int camera) {

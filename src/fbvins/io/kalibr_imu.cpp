@@ -67,8 +67,7 @@ std::optional<ImuPlace> chosen(YamlReader& yaml, const std::string& which) {
 StereoRig seen_from(const StereoRig& rig, const ImuPlace& imu) {
   StereoRig out = rig;
   const Pose<B, B>& T = imu.T_IB;
-  out.T_BC0 = T * rig.T_BC0, out.T_BC1 = T * rig.T_BC1;
-  for (MountedCamera& camera : out.more) camera.T_BC = T * camera.T_BC;
+  for (MountedCamera& camera : out.cameras) camera.T_BC = T * camera.T_BC;
   if (out.depth && out.depth->own) out.depth->own->T_BC = T * out.depth->own->T_BC;
   out.time_offset_s = rig.time_offset_s - imu.time_offset_s;
   return out;

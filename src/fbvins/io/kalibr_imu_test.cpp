@@ -35,8 +35,8 @@ TEST(KalibrImu, PlaceAndClockAreUsed) {
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->imu_noise.gyro_noise_density_radps_rthz, 0.005);
   // (x, y, z) of the body is (y + 0.5, -x, z) of the IMU.
-  EXPECT_LT((read->T_BC0.p - Vec3(0.5, -0.1, 0)).norm(), 1e-12);
-  EXPECT_LT((read->T_BC1.p - Vec3(0.6, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((read->T_BC0().p - Vec3(0.5, -0.1, 0)).norm(), 1e-12);
+  EXPECT_LT((read->T_BC1().p - Vec3(0.6, 0, 0)).norm(), 1e-12);
   EXPECT_LT((read->T_C1C0().p - rig().T_C1C0().p).norm(), 1e-12) << "cameras stay where they are to one another";
   EXPECT_NEAR(read->time_offset_s, 0.006, 1e-12);
 }
@@ -45,7 +45,7 @@ TEST(KalibrImu, WithoutAPlaceNothingMoves) {
   for (const std::string& text : {std::string("imu0:\n") + kNoise, std::string("imu0:\n") + kHere + kNoise}) {
     const Result<StereoRig> read = with_imu_text(rig(), "imu.yaml", text, "");
     ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(read->T_BC0.p, rig().T_BC0.p);
+    EXPECT_EQ(read->T_BC0().p, rig().T_BC0().p);
     EXPECT_EQ(read->time_offset_s, 0.01);
   }
 }
@@ -55,8 +55,8 @@ TEST(KalibrImu, OfSeveralOneIsNamed) {
   EXPECT_EQ(message(with_imu_text(rig(), "imu.yaml", two, "")),
             "imu.yaml: imu: there are several in different places, imu0 (/a) and imu1 (/b): say which one was recorded by a name "
             "behind the file's, --imu-calibration imu.yaml:imu1");
-  EXPECT_LT((with_imu_text(rig(), "imu.yaml", two, "imu0")->T_BC0.p - rig().T_BC0.p).norm(), 1e-12);
-  EXPECT_LT((with_imu_text(rig(), "imu.yaml", two, "imu1")->T_BC0.p - Vec3(0.5, -0.1, 0)).norm(), 1e-12);
+  EXPECT_LT((with_imu_text(rig(), "imu.yaml", two, "imu0")->T_BC0().p - rig().T_BC0().p).norm(), 1e-12);
+  EXPECT_LT((with_imu_text(rig(), "imu.yaml", two, "imu1")->T_BC0().p - Vec3(0.5, -0.1, 0)).norm(), 1e-12);
   EXPECT_EQ(message(with_imu_text(rig(), "imu.yaml", two, "imu2")), "imu.yaml: imu2: is not there");
   EXPECT_NE(message(with_imu_file(rig(), "there/is/none.yaml:imu1")).find("there/is/none.yaml"), std::string::npos);
 }
@@ -95,8 +95,8 @@ TEST(CameraOrder, ByTopicsWhereTheyNameAll) {
   EXPECT_EQ(order_by_topics({"/left", "/left"}, {"/left", "/left"}), Numbers{}) << "one name twice";
   EXPECT_EQ(order_by_topics({}, {"cam0"}), Numbers{});
   const StereoRig turned = in_order(rig(), {1, 0});
-  EXPECT_EQ(turned.T_BC0.p, rig().T_BC1.p);
-  EXPECT_EQ(turned.T_BC1.p, rig().T_BC0.p);
+  EXPECT_EQ(turned.T_BC0().p, rig().T_BC1().p);
+  EXPECT_EQ(turned.T_BC1().p, rig().T_BC0().p);
 }
 
 TEST(ForeignFiles, AreNamedWithWhatToDo) {

@@ -69,9 +69,9 @@ TEST(MaskFields, KalibrsCamerasHaveThemToo) {
   const auto rig = parse_kalibr_camchain({"c.yaml", chain("  mask_circles: [[10, 10, 3]]\n", "  mask: right.png\n")},
                                          holding("right.png", png_of(with_bar())));
   ASSERT_TRUE(rig) << rig.error().message;
-  EXPECT_TRUE(rig->left.mask()->hides({10, 13}));
-  EXPECT_TRUE(rig->right.mask()->hides({25, 42}));
-  EXPECT_FALSE(rig->right.mask()->hides({10, 13}));
+  EXPECT_TRUE(rig->left().mask()->hides({10, 13}));
+  EXPECT_TRUE(rig->right().mask()->hides({25, 42}));
+  EXPECT_FALSE(rig->right().mask()->hides({10, 13}));
 }
 
 TEST(MaskFields, SayWhatIsWrong) {
@@ -129,10 +129,10 @@ TEST(MaskFields, ARigAsTextKeepsItsMasks) {
   ASSERT_TRUE(rig);
   const auto back = parse_rig(rig_to_yaml(*rig), "rig.yaml");
   ASSERT_TRUE(back) << back.error().message;
-  EXPECT_EQ(back->left.mask()->rectangles(), rig->left.mask()->rectangles());
-  EXPECT_EQ(back->right.mask()->rectangles(), rig->right.mask()->rectangles());
-  rig->right.set_mask(nullptr);
-  EXPECT_EQ(parse_rig(rig_to_yaml(*rig), "rig.yaml")->right.mask(), nullptr);
+  EXPECT_EQ(back->left().mask()->rectangles(), rig->left().mask()->rectangles());
+  EXPECT_EQ(back->right().mask()->rectangles(), rig->right().mask()->rectangles());
+  rig->cameras[1].camera.set_mask(nullptr);
+  EXPECT_EQ(parse_rig(rig_to_yaml(*rig), "rig.yaml")->right().mask(), nullptr);
 }
 
 }  // namespace mask_fields_test

@@ -29,12 +29,14 @@ constexpr Duration kImuLeadIn = {1'000'000'000};  // before the first frame: of 
 // The partner of an image is searched for among this many frames before it.
 constexpr std::ptrdiff_t kPairingReach = 8;
 
-/// The number, from 2 on counted from 0, of the camera whose images a topic has: camera_topic().
-std::optional<std::size_t> further_camera(std::string_view topic) {
+/// Whose images a topic has: camera_topic().
+std::optional<int> camera_of(std::string_view topic) {
+  if (topic == kLeftTopic) return 0;
+  if (topic == kRightTopic) return 1;
   constexpr std::string_view kBefore = "/camera/";
   if (topic.size() != kBefore.size() + 1 || !topic.starts_with(kBefore)) return std::nullopt;
   const int camera = topic.back() - '0';
-  return camera >= 2 && camera < kMostCameras ? std::optional(static_cast<std::size_t>(camera - 2)) : std::nullopt;
+  return camera >= 2 && camera < kMostCameras ? std::optional(camera) : std::nullopt;
 }
 
 /// Reads a record step by step; each step leaves its findings in `out`.
@@ -71,11 +73,10 @@ class RecordReader {
     ends_with_image_ = false;
     if (topic == kImuTopic) take_imu(message);
     if (topic == kTruthTopic) take_truth(message);
-    if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
-    if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
+    if (const std::optional<int> camera = camera_of(topic))
+      *camera < 2 ? take_image(message, *camera) : take_further(message, *camera);
     if (topic == kDepthTopic) take_depth(message);
     if (!aiding_.take(message)) reader_.complain(message.offset, "this is not a reading of its topic's sensor");
-    if (const std::optional<std::size_t> further = further_camera(topic)) take_further(message, *further);
   }
 
   void take_imu(const McapMessage& message) {
@@ -105,32 +106,30 @@ class RecordReader {
     out_.ground_truth.push_back({pose->t, {pose->q.normalized(), pose->p}, std::nullopt, std::nullopt});
   }
 
-  void take_image(const McapMessage& message, CameraInfo& camera, std::string FrameEntry::*file) {
-    ++camera.rows.rows;
+  void take_image(const McapMessage& message, int camera) {
+    CameraInfo& info = out_.info.camera(camera);
+    ++info.rows.rows;
     const std::optional<RosImage> image = read_image(message.data);
     if (!image || !image->is_grey()) {
-      ++camera.rows.malformed;
+      ++info.rows.malformed;
       return reader_.complain(message.offset, image ? "this image is not in 8-bit grey (mono8)" : "this is no image");
     }
     if (image->empty()) {  // marks a frame of which neither camera delivered an image
-      out_.frames.push_back({image->t, "", "", out_.imu.size()});
+      out_.frames.push_back({image->t, {}, out_.imu.size()});
       return;
     }
-    ++camera.listed;
+    ++info.listed;
     ends_with_image_ = true;
-    FrameEntry& frame = frame_at(image->t, [&](const FrameEntry& f) { return (f.*file).empty(); });
-    frame.*file = mcap_image_name(message.offset, message.data.size());
+    FrameEntry& frame = frame_at(image->t, [&](const FrameEntry& f) { return f.file(camera).empty(); });
+    frame.file(camera) = mcap_image_name(message.offset, message.data.size());
     frame.imu_before = out_.imu.size();
   }
 
   /// Of the cameras from number 2 on: the message has the frame's time, the image its own.
-  void take_further(const McapMessage& message, std::size_t further) {
-    const auto file_of = [&](FrameEntry& frame) -> std::string& {
-      frame.more_files.resize(std::max(frame.more_files.size(), further + 1));
-      return frame.more_files[further];
-    };
-    const auto [frame, t] = take_beside(message, out_.info.more, &RosImage::is_grey, file_of);
-    if (frame != nullptr && t != message.log_time) frame->offsets.set(static_cast<int>(further) + 2, t - message.log_time);
+  void take_further(const McapMessage& message, int camera) {
+    const auto file_of = [&](FrameEntry& frame) -> std::string& { return frame.file(camera); };
+    const auto [frame, t] = take_beside(message, out_.info.camera(camera), &RosImage::is_grey, file_of);
+    if (frame != nullptr && t != message.log_time) frame->offsets.set(camera, t - message.log_time);
   }
   void take_depth(const McapMessage& message) {
     (void)take_beside(message, out_.info.depth, &RosImage::is_depth, [](FrameEntry& f) -> std::string& { return f.depth_file; });
@@ -162,7 +161,7 @@ class RecordReader {
     auto& frames = out_.frames;
     const auto last = frames.rbegin() + std::min(kPairingReach, std::ssize(frames));
     const auto partner = std::find_if(frames.rbegin(), last, [&](FrameEntry& f) { return f.t == t && is_empty(f); });
-    return partner != last ? *partner : frames.emplace_back(FrameEntry{t, "", "", std::nullopt});
+    return partner != last ? *partner : frames.emplace_back(FrameEntry{t});
   }
 
   /// Where the file ends after one image of a frame, it is unknown whether there was another: the frame is left out.
@@ -171,10 +170,9 @@ class RecordReader {
     const FrameEntry& last = out_.frames.back();
     const std::optional<Result<StereoRig>> rig = attached_calibration();
     const bool known = rig && *rig;
-    const auto further = std::ranges::count_if(last.more_files, [](const std::string& file) { return !file.empty(); });
-    if (last.left_file.empty() || (last.right_file.empty() && !(known && !(*rig)->has_right())) ||
-        std::cmp_less(further, known ? (*rig)->more.size() : 0) || (last.depth_file.empty() && known && (*rig)->depth))
-      out_.frames.pop_back();
+    bool is_whole = !known || !(*rig)->depth || !last.depth_file.empty();
+    for (int i = 0; i < (known ? (*rig)->camera_count() : 2); ++i) is_whole = is_whole && !last.file(i).empty();
+    if (!is_whole) out_.frames.pop_back();
   }
 
   /// The images of cameras without a common trigger, or with time offsets of their own, have stamps of their own: until here each
@@ -185,8 +183,8 @@ class RecordReader {
     std::map<Time, const FrameEntry*> recorded;
     for (const FrameEntry& frame : out_.frames) {
       recorded[frame.t] = &frame;
-      if (!frame.left_file.empty()) left.push_back({frame.t, frame.left_file});
-      if (!frame.right_file.empty()) right.push_back({frame.t + own, frame.right_file});
+      if (!frame.file(0).empty()) left.push_back({frame.t, frame.file(0)});
+      if (!frame.file(1).empty()) right.push_back({frame.t + own, frame.file(1)});
     }
     if (!std::ranges::is_sorted(left, {}, &ImageRow::t) || !std::ranges::is_sorted(right, {}, &ImageRow::t)) return;
     PairedFrames paired = pair_frames(left, right, Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
@@ -197,14 +195,13 @@ class RecordReader {
       if (own.ns != 0) frame.offsets.set(1, frame.offsets.of(1) - own);
       if (as_recorded.empty()) continue;
       frame.imu_before = as_recorded.mapped()->imu_before;
-      frame.more_files = as_recorded.mapped()->more_files;
-      for (std::size_t i = 0; i < frame.more_files.size(); ++i) {
-        const int camera = static_cast<int>(i) + 2;
+      for (int camera = 2; camera < static_cast<int>(as_recorded.mapped()->files.size()); ++camera) {
+        frame.file(camera) = as_recorded.mapped()->file(camera);
         frame.offsets.set(camera, as_recorded.mapped()->offsets.of(camera));
       }
     }
     for (const auto& [t, frame] : recorded)
-      if (frame->left_file.empty() && frame->right_file.empty()) paired.frames.push_back(*frame);
+      if (frame->file(0).empty() && frame->file(1).empty()) paired.frames.push_back(*frame);
     std::ranges::stable_sort(paired.frames, {}, &FrameEntry::t);
     if (paired.untriggered) out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
@@ -215,7 +212,7 @@ class RecordReader {
 
   Result<void> check() {
     const char* lack = nullptr;
-    if (out_.info.left.listed + out_.info.right.listed == 0) lack = "holds no images, so the flight cannot be run again";
+    if (out_.info.camera(0).listed + out_.info.camera(1).listed == 0) lack = "holds no images, so the flight cannot be run again";
     else if (out_.imu.empty() && options_.require_imu) lack = "holds no IMU readings";
     if (!lack) return {};
     if (reader_.damage().parts > 0) return Error{ErrorCode::malformed, reader_.damage().first};
@@ -278,16 +275,15 @@ class RecordReader {
     DatasetInfo& info = out_.info;
     for (const FrameEntry& frame : out_.frames) {
       if (!out_.rig.has_right()) break;
-      info.left.unpaired += !frame.left_file.empty() && frame.right_file.empty();
-      info.right.unpaired += !frame.right_file.empty() && frame.left_file.empty();
+      info.camera(0).unpaired += !frame.file(0).empty() && frame.file(1).empty();
+      info.camera(1).unpaired += !frame.file(1).empty() && frame.file(0).empty();
     }
     if (damage.parts > 0)
       info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
     if (was_cut_off())
       info.warnings.push_back(fmt::format("{}: was cut off while it was written; all up to byte {} is read", name_, damage.end));
-    if (info.left.unpaired + info.right.unpaired > 0)
-      info.warnings.push_back(
-          fmt::format("{} left and {} right images have no partner of the same stamp", info.left.unpaired, info.right.unpaired));
+    if (const int left = info.camera(0).unpaired, right = info.camera(1).unpaired; left + right > 0)
+      info.warnings.push_back(fmt::format("{} left and {} right images have no partner of the same stamp", left, right));
   }
 
   std::shared_ptr<const ByteSource> bytes_;

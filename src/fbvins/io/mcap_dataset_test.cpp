@@ -21,8 +21,8 @@ constexpr std::int64_t kStart_ns = 1'600'000'000'000'000'123, kMs = 1'000'000;
 
 StereoRig small_rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11, -0.1, 0.01, 1e-4, -2e-4}, 32, 24);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 15, 11, -0.1, 0.01, 1e-4, -2e-4}, 32, 24), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   return rig;
 }
 
@@ -37,7 +37,7 @@ ImuSample reading(std::int64_t ms) { return {Time{kStart_ns + ms * kMs}, Vec3(0.
 
 StereoFrame frame(std::int64_t ms, bool left = true, bool right = true) {
   const int seed = static_cast<int>(ms);
-  return {Time{kStart_ns + ms * kMs}, left ? picture(seed) : nullptr, right ? picture(seed + 100) : nullptr};
+  return {Time{kStart_ns + ms * kMs}, {left ? picture(seed) : nullptr, right ? picture(seed + 100) : nullptr}};
 }
 
 /// As an estimator may have received them: an image before its readings, missing readings, one camera alone, neither, a stamp
@@ -90,7 +90,7 @@ std::vector<SensorEvent> flight_of_four(bool triggered) {
   for (int k = 0; k < 8; ++k) {
     out.emplace_back(reading(50 * k));
     StereoFrame all = frame(50 * k, k != 3, k != 3 && k != 4);
-    all.more = {picture(k + 7), k == 5 ? nullptr : picture(k + 9)};
+    all.set_image(2, picture(k + 7)), all.set_image(3, k == 5 ? nullptr : picture(k + 9));
     if (!triggered)
       for (int i = 1; i < 4; ++i)
         if (all.image(i)) all.offsets.set(i, Duration{-(10 + i) * kMs});
@@ -140,10 +140,10 @@ TEST_F(FlightRecordTest, GivesBackTheEventsAndTheirOrder) {
     const std::vector<SensorEvent> back = drain(**data);
     ASSERT_EQ(back.size(), events.size());
     for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
-    EXPECT_EQ((*data)->rig().T_BC1.p, small_rig().T_BC1.p);
+    EXPECT_EQ((*data)->rig().T_BC1().p, small_rig().T_BC1().p);
     EXPECT_EQ((*data)->info().name, "flight");
-    EXPECT_EQ((*data)->info().left.unpaired, 1);
-    EXPECT_EQ((*data)->info().right.unpaired, 1);
+    EXPECT_EQ((*data)->info().camera(0).unpaired, 1);
+    EXPECT_EQ((*data)->info().camera(1).unpaired, 1);
   }
 }
 
@@ -205,13 +205,13 @@ TEST_F(FlightRecordTest, KeepsTheOffsetsOfCamerasWithoutACommonTrigger) {
 /// The right camera's stamps are 8 ms late, as its calibration says: its images are those of their frames again, also where the
 /// left one's are missing.
 TEST_F(FlightRecordTest, KeepsFramesOfCamerasWithTimesOfTheirOwn) {
-  rig_.more.push_back({rig_.left, Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1, 0))});
-  rig_.right.set_own_times({.time_offset_s = -0.008});
+  rig_.cameras.push_back({rig_.left(), Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1, 0))});
+  rig_.cameras[1].camera.set_own_times({.time_offset_s = -0.008});
   std::vector<SensorEvent> events;
   for (int k = 0; k < 8; ++k) {
     events.emplace_back(reading(50 * k));
     StereoFrame all = frame(50 * k, k != 3, k != 5);
-    all.more = {picture(k + 7)};
+    all.set_image(2, picture(k + 7));
     all.offsets.set(1, Duration{8 * kMs});
     events.emplace_back(std::move(all));
   }
@@ -226,7 +226,7 @@ TEST_F(FlightRecordTest, KeepsFramesOfCamerasWithTimesOfTheirOwn) {
 }
 
 TEST_F(FlightRecordTest, KeepsFourCameras) {
-  for (int i = 2; i < 4; ++i) rig_.more.push_back({rig_.left, Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1 * i, 0))});
+  for (int i = 2; i < 4; ++i) rig_.cameras.push_back({rig_.left(), Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1 * i, 0))});
   for (const bool triggered : {true, false}) {
     const std::vector<SensorEvent> events = flight_of_four(triggered);
     write(events);
@@ -243,7 +243,7 @@ TEST_F(FlightRecordTest, KeepsFourCameras) {
 }
 
 TEST_F(FlightRecordTest, OfFourCamerasBreakingOffCostsTheEndOnly) {
-  for (int i = 2; i < 4; ++i) rig_.more.push_back({rig_.left, Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1 * i, 0))});
+  for (int i = 2; i < 4; ++i) rig_.cameras.push_back({rig_.left(), Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1 * i, 0))});
   const std::vector<SensorEvent> events = flight_of_four(true);
   write(events);
   const std::string whole = *read_file(path_, 1u << 24u);
@@ -261,7 +261,7 @@ TEST_F(FlightRecordTest, OfFourCamerasBreakingOffCostsTheEndOnly) {
 
 TEST_F(FlightRecordTest, KeepsDepths) {
   DepthSensor elsewhere;  // with images of another size
-  elsewhere.own = MountedCamera{Camera(PinholeRadtan{20, 21, 19.5, 7.5, 0, 0, 0, 0}, 40, 16), {Quat::Identity(), rig_.T_BC0.p}};
+  elsewhere.own = MountedCamera{Camera(PinholeRadtan{20, 21, 19.5, 7.5, 0, 0, 0, 0}, 40, 16), {Quat::Identity(), rig_.T_BC0().p}};
   rig_ = with_depth(rig_, elsewhere);
   std::vector<SensorEvent> events;
   for (int k = 0; k < 4; ++k) {
@@ -277,7 +277,7 @@ TEST_F(FlightRecordTest, KeepsDepths) {
   ASSERT_TRUE(data) << data.error().message;
   ASSERT_TRUE((*data)->rig().depth && (*data)->rig().depth->own);
   EXPECT_EQ((*data)->rig().depth->own->camera.intrinsics()[3], 7.5);
-  EXPECT_EQ((*data)->info().left.unpaired, 0) << "one camera has no partner";
+  EXPECT_EQ((*data)->info().camera(0).unpaired, 0) << "one camera has no partner";
   const std::vector<SensorEvent> back = drain(**data);
   ASSERT_EQ(back.size(), events.size());
   for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
@@ -369,7 +369,7 @@ TEST_F(FlightRecordTest, ACamchainReplacesTheCamerasAndNotTheNoise) {
   StereoRig own = small_rig(), kalibr = small_rig();
   own.imu_noise.gyro_noise_density_radps_rthz = 3e-4;
   kalibr.imu_noise.gyro_noise_density_radps_rthz = 5e-4;
-  kalibr.T_BC1.p = Vec3(0.2, 0, 0);
+  kalibr.cameras[1].T_BC.p = Vec3(0.2, 0, 0);
   const KalibrFiles files(kalibr);
   auto record = FlightRecord::create(path_, own, {.program = "a test", .images = true});
   ASSERT_TRUE(record);
@@ -377,7 +377,7 @@ TEST_F(FlightRecordTest, ACamchainReplacesTheCamerasAndNotTheNoise) {
   ASSERT_TRUE(record->finish());
   const auto cameras = open_dataset(path_, {.kalibr_camchain = files.camchain()});
   ASSERT_TRUE(cameras) << cameras.error().message;
-  EXPECT_NEAR((*cameras)->rig().T_BC1.p.x(), 0.2, 1e-12);
+  EXPECT_NEAR((*cameras)->rig().T_BC1().p.x(), 0.2, 1e-12);
   EXPECT_DOUBLE_EQ((*cameras)->rig().imu_noise.gyro_noise_density_radps_rthz, 3e-4);
   const auto both = open_dataset(path_, {.kalibr_camchain = files.camchain(), .kalibr_imu = files.imu()});
   ASSERT_TRUE(both) << both.error().message;
@@ -416,13 +416,13 @@ TEST_F(FlightRecordTest, TruthOfAConvertedRecordingIsKept) {
 }
 
 TEST_F(FlightRecordTest, AnImageOfAnotherSizeIsLeftOut) {
-  write({reading(0), frame(0), reading(5), StereoFrame{Time{kStart_ns + 5 * kMs}, picture(1, 8, 8), picture(2)}, reading(10),
+  write({reading(0), frame(0), reading(5), StereoFrame{Time{kStart_ns + 5 * kMs}, {picture(1, 8, 8), picture(2)}}, reading(10),
          frame(10)});
   auto data = open_dataset(path_);
   ASSERT_TRUE(data) << data.error().message;
   const std::vector<SensorEvent> back = drain(**data);
-  EXPECT_EQ(std::get<StereoFrame>(back[3]).left, nullptr);
-  EXPECT_EQ((*data)->info().left.images.wrong_size, 1);
+  EXPECT_EQ(std::get<StereoFrame>(back[3]).left(), nullptr);
+  EXPECT_EQ((*data)->info().camera(0).images.wrong_size, 1);
   EXPECT_TRUE((*data)->info().warnings.back().ends_with(": 8 x 8 pixels where the calibration says 32 x 24"));
 }
 

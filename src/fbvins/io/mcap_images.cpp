@@ -41,11 +41,9 @@ class McapLoader : public FrameLoader {
                                    std::shared_ptr<const T>& image) {
       if (!file.empty()) image = load_image<T>(ImagePlace::of(file), camera, counts, out);
     };
-    load(entry.left_file, rig_.left, out.left, out.frame.left);
-    load(entry.right_file, rig_.right, out.right, out.frame.right);
-    out.frame.more.resize(entry.more_files.size());
-    for (std::size_t i = 0; i < entry.more_files.size(); ++i)
-      load(entry.more_files[i], rig_.camera(static_cast<int>(i) + 2), out.more, out.frame.more[i]);
+    out.frame.images.resize(entry.files.size());
+    for (int i = 0; i < static_cast<int>(entry.files.size()); ++i)
+      load(entry.file(i), rig_.camera(i), out.of(i), out.frame.images[static_cast<std::size_t>(i)]);
     load(entry.depth_file, rig_.depth_camera(), out.depth, out.frame.depth);
     return out;
   }

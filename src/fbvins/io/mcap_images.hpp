@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images of a flight record, read from its file when a frame is asked for.
 //
-//   entry.left_file = mcap_image_name(message.offset, message.data.size());
+//   entry.file(0) = mcap_image_name(message.offset, message.data.size());
 //   std::unique_ptr<FrameLoader> loader = make_mcap_loader(bytes, "flight.mcap", rig);
 #pragma once
 

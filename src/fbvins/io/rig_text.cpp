@@ -20,7 +20,7 @@ std::string own_times_text(const Camera& camera) {
   return out;
 }
 
-std::string camera_text(const char* name, const Camera& camera) {
+std::string camera_text(const std::string& name, const Camera& camera) {
   const KalibrCamera c = kalibr_camera(camera);
   return fmt::format(
       "{}:\n  camera_model: {}\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
@@ -38,7 +38,7 @@ Camera read_exact_camera(YamlReader& yaml, const std::string& name) {
 }
 
 template <class To, class From>
-std::string pose_text(const char* name, const Pose<To, From>& T) {
+std::string pose_text(const std::string& name, const Pose<To, From>& T) {
   return fmt::format("{}:\n  q_wxyz: {}\n  p_m: {}\n", name, yaml_list({T.q.w(), T.q.x(), T.q.y(), T.q.z()}),
                      yaml_list({T.p.x(), T.p.y(), T.p.z()}));
 }
@@ -55,19 +55,24 @@ Pose<To, From> read_pose(YamlReader& yaml, const std::string& name) {
   return T;
 }
 
-/// Cameras from number 2 on.
-std::string further_cameras_text(const StereoRig& rig) {
-  std::string out;
-  for (int i = 2; i < rig.camera_count(); ++i)
-    out +=
-        camera_text(fmt::format("camera{}", i).c_str(), rig.camera(i)) + pose_text(fmt::format("T_BC{}", i).c_str(), rig.T_BC(i));
-  return out;
+std::string name_of(int camera) { return camera == 0 ? "left" : camera == 1 ? "right" : fmt::format("camera{}", camera); }
+
+std::string pose_name(int camera) { return fmt::format("T_BC{}", camera); }
+
+/// Of the first two all lenses come before the poses.
+std::string cameras_text(const StereoRig& rig) {
+  std::string lenses, poses, further;
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    (i < 2 ? lenses : further) += camera_text(name_of(i), rig.camera(i));
+    (i < 2 ? poses : further) += pose_text(pose_name(i), rig.T_BC(i));
+  }
+  return lenses + poses + further;
 }
 
-std::vector<MountedCamera> read_further_cameras(YamlReader& yaml) {
+std::vector<MountedCamera> read_cameras(YamlReader& yaml) {
   std::vector<MountedCamera> out;
-  for (int i = 2; i < kMostCameras && yaml.has(yaml.root(), fmt::format("camera{}", i)); ++i)
-    out.push_back({read_exact_camera(yaml, fmt::format("camera{}", i)), read_pose<B, C0>(yaml, fmt::format("T_BC{}", i))});
+  for (int i = 0; i < kMostCameras && (i == 0 || yaml.has(yaml.root(), name_of(i))); ++i)
+    out.push_back({read_exact_camera(yaml, name_of(i)), read_pose<B, C0>(yaml, pose_name(i))});
   return out;
 }
 
@@ -77,9 +82,7 @@ std::string rig_to_yaml(const StereoRig& rig) {
   const ImuNoise& n = rig.imu_noise;
   return "# The rig, every number exact. T_BC takes camera to body (IMU) coordinates, quaternions are Hamilton's with w first;\n"
          "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
-         camera_text("left", rig.left) + (rig.has_right() ? camera_text("right", rig.right) : "") +
-         pose_text("T_BC0", rig.T_BC0) + (rig.has_right() ? pose_text("T_BC1", rig.T_BC1) : "") + further_cameras_text(rig) +
-         fmt::format("imu:\n  rate_hz: {:.17g}\n", n.rate_hz) + imu_noise_text(n, "  ", "{:.17g}") +
+         cameras_text(rig) + fmt::format("imu:\n  rate_hz: {:.17g}\n", n.rate_hz) + imu_noise_text(n, "  ", "{:.17g}") +
          fmt::format("  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\n", n.max_gyro_radps, n.max_accel_mps2) +
          imu_axes_text(n.axes, "  ", true) +
          fmt::format("image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n", rig.image_rate_hz, rig.time_offset_s) +
@@ -93,14 +96,7 @@ std::string rig_to_yaml(const StereoRig& rig) {
 Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
   YamlReader yaml(file, text);
   StereoRig rig;
-  rig.left = read_exact_camera(yaml, "left");
-  rig.T_BC0 = read_pose<B, C0>(yaml, "T_BC0");
-  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
-  if (yaml.has(yaml.root(), "right")) {
-    rig.right = read_exact_camera(yaml, "right");
-    rig.T_BC1 = read_pose<B, C1>(yaml, "T_BC1");
-  }
-  rig.more = read_further_cameras(yaml);
+  rig.cameras = read_cameras(yaml);
   rig.imu_noise = read_imu_noise(yaml, yaml.get(yaml.root(), "imu"), "rate_hz");
   rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
   rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");

@@ -14,19 +14,20 @@ namespace rig_text_test {
 StereoRig awkward_rig(Rng& rng, bool fisheye) {
   const auto odd = [&] { return rng.normal() / 3.0; };
   StereoRig rig;
+  rig.cameras.resize(2);
   const double f = 400.0 + odd(), c = 310.0 + odd(), k1 = 0.03 * std::abs(odd()), k2 = 1e-7 * odd(), k3 = 1e-3 * odd(),
                k4 = 1e-3 * odd();
-  if (fisheye) rig.left = Camera(KannalaBrandt{f, f / 3, c, c / 4, k1, k2, k3, k4}, 640, 161);
-  else rig.left = Camera(PinholeRadtan{f, f / 3, c, c / 4, k1, k2, k3, k4}, 640, 161);
-  rig.right = Camera(PinholeRadtan{f / 1.1, f / 1.3, c * 1.1, c / 1.3, k2, k1, k4, k3}, 752, 480);
+  if (fisheye) rig.cameras[0].camera = Camera(KannalaBrandt{f, f / 3, c, c / 4, k1, k2, k3, k4}, 640, 161);
+  else rig.cameras[0].camera = Camera(PinholeRadtan{f, f / 3, c, c / 4, k1, k2, k3, k4}, 640, 161);
+  rig.cameras[1].camera = Camera(PinholeRadtan{f / 1.1, f / 1.3, c * 1.1, c / 1.3, k2, k1, k4, k3}, 752, 480);
   const double x = odd(), y = odd(), z = odd();
-  rig.T_BC0 = {so3_exp(Vec3(x, y, z)), Vec3(z, x, y)};
-  rig.T_BC1 = {so3_exp(Vec3(y, z, x)), Vec3(z + 0.1, x, y)};
+  rig.cameras[0].T_BC = {so3_exp(Vec3(x, y, z)), Vec3(z, x, y)};
+  rig.cameras[1].T_BC = {so3_exp(Vec3(y, z, x)), Vec3(z + 0.1, x, y)};
   rig.imu_noise = {1e-4 / 3, 2e-3 / 7, 2e-5 / 3, 3e-3 / 11, 200.0 / 3};
   rig.image_rate_hz = 20.0 / 3;
   rig.time_offset_s = odd() / 100;
   rig.line_delay_s = odd() / 1e5;
-  rig.right.set_own_times({0.01 / 3, 1e-5 / 7});
+  rig.cameras[1].camera.set_own_times({0.01 / 3, 1e-5 / 7});
   return rig;
 }
 
@@ -48,15 +49,15 @@ TEST(RigText, GivesBackTheSameBits) {
     const StereoRig rig = awkward_rig(rng, i % 2 == 0);
     const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
     ASSERT_TRUE(back) << back.error().message;
-    EXPECT_TRUE(same_camera(back->left, rig.left));
-    EXPECT_TRUE(same_camera(back->right, rig.right));
-    EXPECT_TRUE(back->T_BC0.q.coeffs() == rig.T_BC0.q.coeffs() && back->T_BC0.p == rig.T_BC0.p);
-    EXPECT_TRUE(back->T_BC1.q.coeffs() == rig.T_BC1.q.coeffs() && back->T_BC1.p == rig.T_BC1.p);
+    EXPECT_TRUE(same_camera(back->left(), rig.left()));
+    EXPECT_TRUE(same_camera(back->right(), rig.right()));
+    EXPECT_TRUE(back->T_BC0().q.coeffs() == rig.T_BC0().q.coeffs() && back->T_BC0().p == rig.T_BC0().p);
+    EXPECT_TRUE(back->T_BC1().q.coeffs() == rig.T_BC1().q.coeffs() && back->T_BC1().p == rig.T_BC1().p);
     EXPECT_TRUE(same(back->imu_noise, rig.imu_noise));
     EXPECT_EQ(back->image_rate_hz, rig.image_rate_hz);
     EXPECT_EQ(back->time_offset_s, rig.time_offset_s);
     EXPECT_EQ(back->line_delay_s, rig.line_delay_s);
-    EXPECT_EQ(back->left.max_normalised_radius(), rig.left.max_normalised_radius());
+    EXPECT_EQ(back->left().max_normalised_radius(), rig.left().max_normalised_radius());
   }
 }
 
@@ -66,15 +67,15 @@ TEST(RigText, GivesBackARigOfOneCamera) {
   const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_FALSE(back->has_right());
-  EXPECT_TRUE(same_camera(back->left, rig.left));
-  EXPECT_EQ(back->T_BC1.p, rig.T_BC0.p);
+  EXPECT_TRUE(same_camera(back->left(), rig.left()));
+  EXPECT_EQ(back->T_BC1().p, rig.T_BC0().p);
 }
 
 TEST(RigText, GivesBackFourCameras) {
   Rng rng(15);
   StereoRig rig = awkward_rig(rng, true);
   const StereoRig others = awkward_rig(rng, false);
-  rig.more = {others.mounted(0), others.mounted(1)};
+  rig.cameras.insert(rig.cameras.end(), {others.mounted(0), others.mounted(1)});
   const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
   ASSERT_TRUE(back) << back.error().message;
   ASSERT_EQ(back->camera_count(), 4);
@@ -89,7 +90,7 @@ TEST(RigText, GivesBackADepthSensor) {
   DepthSensor sensor{.noise_at_1m_m = 0.01 / 3, .nearest_m = 0.1 / 7, .farthest_m = 20.0 / 3, .scale_sigma = 0.1 / 11};
   for (const bool elsewhere : {false, true}) {
     StereoRig rig = awkward_rig(rng, false);
-    if (elsewhere) sensor.own = MountedCamera{rig.right, {rig.T_BC1.q, rig.T_BC0.p + Vec3(0.1 / 3, 0.1 / 7, 0)}};
+    if (elsewhere) sensor.own = MountedCamera{rig.right(), {rig.T_BC1().q, rig.T_BC0().p + Vec3(0.1 / 3, 0.1 / 7, 0)}};
     rig = with_depth(rig, sensor);
     const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
     ASSERT_TRUE(back) << back.error().message;
@@ -98,7 +99,7 @@ TEST(RigText, GivesBackADepthSensor) {
     EXPECT_EQ(back->depth->nearest_m, sensor.nearest_m);
     EXPECT_EQ(back->depth->farthest_m, sensor.farthest_m);
     EXPECT_EQ(back->depth->scale_sigma, sensor.scale_sigma);
-    EXPECT_EQ(back->T_BC1.p, rig.T_BC1.p);
+    EXPECT_EQ(back->T_BC1().p, rig.T_BC1().p);
     ASSERT_EQ(back->depth->own.has_value(), elsewhere);
     if (!elsewhere) continue;
     EXPECT_TRUE(same_camera(back->depth->own->camera, sensor.own->camera));
@@ -115,11 +116,11 @@ TEST(RigText, GivesBackTheBitsOfWideLenses) {
                                         ExtendedUnified{300, 301 / 3.0, 160.2 / 1.1, 124, 0.1 / 3, 1.04 / 3}},
         {UnifiedRadtan{300.1 / 3, 301, 150, 251 / 2.1, 0.8 / 3, -0.3 / 7, 0.1 / 7, 1e-3 / 7, -1e-4 / 7},
          DoubleSphere{300, 301, 150, 121, 0.3, 0.5}}}) {
-    rig.left = Camera(left, 320, 240), rig.right = Camera(right, 320, 240);
+    rig.cameras[0].camera = Camera(left, 320, 240), rig.cameras[1].camera = Camera(right, 320, 240);
     const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
     ASSERT_TRUE(back) << back.error().message;
-    EXPECT_TRUE(same_camera(back->left, rig.left));
-    EXPECT_TRUE(same_camera(back->right, rig.right));
+    EXPECT_TRUE(same_camera(back->left(), rig.left()));
+    EXPECT_TRUE(same_camera(back->right(), rig.right()));
   }
 }
 

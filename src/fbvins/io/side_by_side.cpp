@@ -6,8 +6,8 @@
 namespace fbvins {
 
 bool is_side_by_side(std::int64_t width, std::int64_t height, const StereoRig& rig) {
-  return rig.camera_count() == 2 && width == 2 * std::int64_t{rig.left.width()} && height == rig.left.height() &&
-         rig.right.width() == rig.left.width() && rig.right.height() == rig.left.height();
+  return rig.camera_count() == 2 && width == 2 * std::int64_t{rig.left().width()} && height == rig.left().height() &&
+         rig.right().width() == rig.left().width() && rig.right().height() == rig.left().height();
 }
 
 Image half_of(const Image& both, int camera) {

@@ -22,9 +22,10 @@ constexpr int kWidth = 64, kHeight = 48;
 
 StereoRig rig_of_two() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002}, kWidth, kHeight);
-  rig.right = Camera(PinholeRadtan{42, 43, 32.5, 22.5, -0.125, 0.03125, 0, 0}, kWidth, kHeight);
-  rig.T_BC1 = {Quat::Identity(), Vec3(0.1, 0, 0)};
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002}, kWidth, kHeight);
+  rig.cameras[1].camera = Camera(PinholeRadtan{42, 43, 32.5, 22.5, -0.125, 0.03125, 0, 0}, kWidth, kHeight);
+  rig.cameras[1].T_BC = {Quat::Identity(), Vec3(0.1, 0, 0)};
   return rig;
 }
 
@@ -38,7 +39,7 @@ std::string recording(const std::string& name, int width = 2 * kWidth) {
   for (int i = 0; i < 60; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
   const auto blank = std::make_shared<const Image>(kWidth, kHeight);
   for (int i = 0; i < 3; ++i)
-    EXPECT_TRUE(writer->add({Time{1'020'000'000 + i * 50'000'000}, blank, blank}, Time{1'020'000'000 + i * 50'000'000}).ok());
+    EXPECT_TRUE(writer->add({Time{1'020'000'000 + i * 50'000'000}, {blank, blank}}, Time{1'020'000'000 + i * 50'000'000}).ok());
   EXPECT_TRUE(writer->finish(readings, {}).ok());
   Image both(width, kHeight);
   for (int y = 0; y < kHeight; ++y)
@@ -59,10 +60,10 @@ void expect_split(const Result<std::unique_ptr<Dataset>>& data) {
   int frames = 0;
   while (auto event = (*data)->next())
     if (const auto* frame = std::get_if<StereoFrame>(&*event)) {
-      ASSERT_TRUE(frame->left && frame->right);
-      EXPECT_EQ(frame->left->width(), kWidth);
-      EXPECT_EQ(frame->left->at(kWidth - 1, 5), 10);
-      EXPECT_EQ(frame->right->at(0, 5), 200);
+      ASSERT_TRUE(frame->left() && frame->right());
+      EXPECT_EQ(frame->left()->width(), kWidth);
+      EXPECT_EQ(frame->left()->at(kWidth - 1, 5), 10);
+      EXPECT_EQ(frame->right()->at(0, 5), 200);
       ++frames;
     }
   EXPECT_EQ(frames, 3);
@@ -84,7 +85,7 @@ TEST(SideBySide, OtherWidthsAreNotTaken) {
   EXPECT_FALSE(is_side_by_side(64, 48, rig_of_two()));
   EXPECT_FALSE(is_side_by_side(128, 24, rig_of_two()));
   StereoRig one = rig_of_two();
-  one.right = Camera();
+  one.cameras.pop_back();
   EXPECT_FALSE(is_side_by_side(128, 48, one));
 }
 

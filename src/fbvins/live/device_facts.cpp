@@ -119,7 +119,7 @@ void judge_exposure(const DeviceFacts& facts, const StereoRig& rig, Findings& fi
   const double longest = facts.longest_exposure_ms.value_or(rig.image_rate_hz > 0 ? 1e3 / rig.image_rate_hz : 0);
   if (!facts.exposure_ms && !facts.longest_exposure_ms) return;
   const std::string now = facts.exposure_ms ? fmt::format("exposure {:.1f} ms, ", *facts.exposure_ms) : "exposure ";
-  const double blur = blur_px(rig.left, longest);
+  const double blur = blur_px(rig.left(), longest);
   const std::string what =
       fmt::format("{}at most {:.1f} ms, which is a blur of {:.1f} px while the camera turns by 1 rad/s", now, longest, blur);
   if (blur <= kMostBlur_px) findings.push_back(good(what));

@@ -8,8 +8,9 @@ namespace device_facts_test {
 
 StereoRig rig_of_a_d435i() {
   StereoRig rig;
-  rig.left = Camera(PinholeRadtan{385, 385, 320, 240, 0, 0, 0, 0}, 640, 480);
-  rig.right = rig.left;
+  rig.cameras.resize(2);
+  rig.cameras[0].camera = Camera(PinholeRadtan{385, 385, 320, 240, 0, 0, 0, 0}, 640, 480);
+  rig.cameras[1].camera = rig.left();
   rig.image_rate_hz = 30;
   return rig;
 }

@@ -17,11 +17,6 @@ constexpr double kSilentPeriods = 2.5;
 /// And one that never delivered, this long after the first image of another.
 constexpr Duration kLongestStart{1'000'000'000};
 
-void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Image> image) {
-  if (camera >= 2 && frame.more.size() < camera - 1) frame.more.resize(camera - 1);
-  (camera == 0 ? frame.left : camera == 1 ? frame.right : frame.more[camera - 2]) = std::move(image);
-}
-
 }  // namespace
 
 bool FrameJoiner::are_one_instant(Time a, Time b) const { return std::abs((a - b).ns) <= tolerance_.ns; }
@@ -96,7 +91,7 @@ void FrameJoiner::take_first(std::size_t stream, StereoFrame& frame) {
   Waiting first = std::move(streams_[stream].waiting.front());
   streams_[stream].waiting.pop_front();
   if (auto* depth = std::get_if<std::shared_ptr<const DepthImage>>(&first.pixels)) frame.depth = std::move(*depth);
-  else put_into(frame, stream, std::get<std::shared_ptr<const Image>>(std::move(first.pixels)));
+  else frame.set_image(static_cast<int>(stream), std::get<std::shared_ptr<const Image>>(std::move(first.pixels)));
 }
 
 /// Of a camera without a common trigger: the image nearest to a quarter of an interval before the frame.
@@ -122,7 +117,7 @@ std::optional<StereoFrame> FrameJoiner::of_a_free_one() {
         (earliest == streams_.size() || streams_[i].waiting.front().t < streams_[earliest].waiting.front().t))
       earliest = i;
   if (earliest == streams_.size()) return std::nullopt;
-  StereoFrame frame{streams_[earliest].waiting.front().t, nullptr, nullptr};
+  StereoFrame frame{streams_[earliest].waiting.front().t};
   take_first(earliest, frame);
   return frame;
 }
@@ -157,7 +152,7 @@ std::optional<StereoFrame> FrameJoiner::next_by_exposure() {
 
 /// Whether a frame without camera 0 is too near to one of camera 0 to be another moment.
 bool FrameJoiner::is_stray(const StereoFrame& frame) const {
-  if (frame.left) return false;
+  if (frame.left()) return false;
   const Stream& zero = streams_.front();
   // A lost image makes one interval as long as two.
   const Duration interval = zero.before.ns > 0 ? std::min(zero.interval, zero.before) : zero.interval;
@@ -169,7 +164,7 @@ StereoFrame FrameJoiner::counted(StereoFrame frame) {
   bool whole = true;
   for (int i = 0; i < cameras_; ++i) whole &= frame.image(i) != nullptr;
   ++(whole ? whole_ : parts_);
-  if (frame.left) last_zero_ = frame.t;
+  if (frame.left()) last_zero_ = frame.t;
   return frame;
 }
 

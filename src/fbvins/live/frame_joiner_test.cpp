@@ -23,8 +23,8 @@ class Pairs {
     while (const auto frame = joiner_.next()) {
       if (!given.empty()) given += " ";
       given += std::to_string(frame->t.ns / 10'000'000);
-      if (!frame->right) given += "L";
-      if (!frame->left) given += "R";
+      if (!frame->right()) given += "L";
+      if (!frame->left()) given += "R";
       if (const Duration offset = frame->offsets.of(1); offset.ns != 0) given += std::to_string(offset.ns / 1'000'000);
     }
   }
@@ -167,7 +167,7 @@ class Several {
     while (const auto frame = joiner_.next()) {
       if (!given.empty()) given += " ";
       given += std::to_string(frame->t.ns / 10'000'000) + ":";
-      for (int i = 0; i < 2 + static_cast<int>(frame->more.size()); ++i) {
+      for (int i = 0; i < static_cast<int>(frame->images.size()); ++i) {
         if (!frame->image(i)) continue;
         given += std::to_string(i);
         if (const Duration offset = frame->offsets.of(i); offset.ns != 0) given += std::to_string(offset.ns / 1'000'000);
@@ -248,7 +248,7 @@ TEST(FrameJoiner, StampsThatTheCalibrationExplainsAreOfOneInstant) {
       EXPECT_EQ(frame->offsets.of(2).ns, -3'000'000);
       frame->offsets += own;
       EXPECT_TRUE(frame->offsets.all_zero());
-      given += std::to_string(frame->t.ns / 1'000'000) + (frame->left && frame->right && frame->image(2) ? " " : "? ");
+      given += std::to_string(frame->t.ns / 1'000'000) + (frame->left() && frame->right() && frame->image(2) ? " " : "? ");
     }
   };
   for (int k = 1; k < 5; ++k) add(2, 50 * k - 3), add(0, 50 * k), add(1, 50 * k + 8);

@@ -87,14 +87,12 @@ std::shared_ptr<const DepthImage> FrameRing::depth(const SocketFrame& frame) con
 
 template <class ImageOf>
 StereoFrame FrameRing::with_images(const SocketFrame& frame, ImageOf&& image_of) const {
-  StereoFrame out{frame.t, nullptr, nullptr};
+  StereoFrame out{frame.t};
   out.offsets = frame.offsets;
   out.depth = depth(frame);
-  out.more.resize(static_cast<std::size_t>(std::max(0, layout_.cameras - 2)));
   for (int i = 0; i < layout_.cameras; ++i) {
     if ((frame.images >> static_cast<unsigned>(i) & 1U) == 0) continue;
-    std::shared_ptr<const Image>& image = i == 0 ? out.left : i == 1 ? out.right : out.more[static_cast<std::size_t>(i - 2)];
-    image = std::make_shared<const Image>(image_of(pixels(frame, i)));
+    out.set_image(i, std::make_shared<const Image>(image_of(pixels(frame, i))));
   }
   return out;
 }

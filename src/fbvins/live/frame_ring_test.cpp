@@ -41,11 +41,11 @@ TEST_F(FrameRingTest, FramesAreTheSendersMemory) {
   const auto frame = ring_->take(frame_in(2));
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->t, Time{1002});
-  EXPECT_TRUE(frame->left->foreign());
-  EXPECT_EQ(std::memcmp(frame->left->row(0), slots_ + 2 * kSlotBytes, kLayout.image_bytes()), 0);
-  EXPECT_EQ(std::memcmp(frame->right->row(0), slots_ + 2 * kSlotBytes + kSlotBytes / 2, kLayout.image_bytes()), 0);
+  EXPECT_TRUE(frame->left()->foreign());
+  EXPECT_EQ(std::memcmp(frame->left()->row(0), slots_ + 2 * kSlotBytes, kLayout.image_bytes()), 0);
+  EXPECT_EQ(std::memcmp(frame->right()->row(0), slots_ + 2 * kSlotBytes + kSlotBytes / 2, kLayout.image_bytes()), 0);
   slots_[2 * kSlotBytes] = 123;  // the same memory, not a copy
-  EXPECT_EQ(frame->left->at(0, 0), 123);
+  EXPECT_EQ(frame->left()->at(0, 0), 123);
 }
 
 TEST_F(FrameRingTest, ImagesOfThreeCamerasInOneSlot) {
@@ -59,9 +59,9 @@ TEST_F(FrameRingTest, ImagesOfThreeCamerasInOneSlot) {
   sent.offsets.set(2, Duration{7});
   const auto frame = (*ring)->take(sent);
   ASSERT_TRUE(frame);
-  EXPECT_EQ(frame->right, nullptr);
-  ASSERT_EQ(frame->more.size(), 1u);
-  EXPECT_EQ(std::memcmp(frame->more[0]->row(0), slots_ + 2 * kSlotBytes - layout.image_bytes(), layout.image_bytes()), 0);
+  EXPECT_EQ(frame->right(), nullptr);
+  ASSERT_EQ(frame->images.size(), 3u);
+  EXPECT_EQ(std::memcmp(frame->images[2]->row(0), slots_ + 2 * kSlotBytes - layout.image_bytes(), layout.image_bytes()), 0);
   EXPECT_EQ(frame->offsets.of(2), Duration{7});
   sent.slot = 2, sent.images = 0b1000;
   const auto beyond = (*ring)->take(sent);
@@ -81,7 +81,7 @@ TEST_F(FrameRingTest, ADepthImageBesideThatOfTheCamera) {
   sent.images = FBVINS_SOCKET_LEFT | FBVINS_SOCKET_DEPTH;
   const auto frame = (*ring)->take(sent);
   ASSERT_TRUE(frame);
-  EXPECT_NE(frame->left, nullptr);
+  EXPECT_NE(frame->left(), nullptr);
   ASSERT_NE(frame->depth, nullptr);
   std::uint16_t last = 0;
   std::memcpy(&last, slots_ + 3 * kSlotBytes + 2 * layout.depth_values() - 2, 2);
@@ -95,9 +95,8 @@ TEST_F(FrameRingTest, ASlotIsFreeWhenItsLastImageIsGone) {
   auto frame = ring_->take(frame_in(1));
   ASSERT_TRUE(frame);
   EXPECT_EQ(ring_->held(), 1);
-  std::shared_ptr<const Image> right = frame->right;
-  frame->left.reset();
-  frame->right.reset();
+  std::shared_ptr<const Image> right = frame->right();
+  frame->images.clear();
   EXPECT_EQ(ring_->released(), 0u);
   EXPECT_FALSE(rings(*wake_));
   EXPECT_FALSE(ring_->take(frame_in(1)));  // still held
@@ -115,19 +114,19 @@ TEST_F(FrameRingTest, WhereSlotsAreScarceImagesAreCopied) {
   ASSERT_TRUE(first && second);
   const auto third = ring_->take(frame_in(1));
   ASSERT_TRUE(third);
-  EXPECT_FALSE(third->left->foreign());
+  EXPECT_FALSE(third->left()->foreign());
   EXPECT_EQ(ring_->released(), 2u);
-  EXPECT_EQ(third->right->at(5, 0), slots_[kSlotBytes + kSlotBytes / 2 + 5]);
+  EXPECT_EQ(third->right()->at(5, 0), slots_[kSlotBytes + kSlotBytes / 2 + 5]);
   slots_[kSlotBytes + kSlotBytes / 2 + 5] ^= 1;
-  EXPECT_NE(third->right->at(5, 0), slots_[kSlotBytes + kSlotBytes / 2 + 5]);
+  EXPECT_NE(third->right()->at(5, 0), slots_[kSlotBytes + kSlotBytes / 2 + 5]);
 }
 
 TEST_F(FrameRingTest, AMissingImageIsANullPointer) {
   const auto frame = ring_->take({{1}, 0, 0, 0b10});
   ASSERT_TRUE(frame);
-  EXPECT_EQ(frame->left, nullptr);
-  ASSERT_NE(frame->right, nullptr);
-  EXPECT_EQ(frame->right->at(0, 0), slots_[kSlotBytes / 2]);
+  EXPECT_EQ(frame->left(), nullptr);
+  ASSERT_NE(frame->right(), nullptr);
+  EXPECT_EQ(frame->right()->at(0, 0), slots_[kSlotBytes / 2]);
 }
 
 TEST_F(FrameRingTest, ImagesOutliveTheRingAndItsSender) {
@@ -136,14 +135,14 @@ TEST_F(FrameRingTest, ImagesOutliveTheRingAndItsSender) {
   const std::uint8_t wanted = slots_[3 * kSlotBytes + 9];
   ring_.reset();
   memory_ = FileDescriptor();
-  EXPECT_EQ(frame->left->at(9, 0), wanted);
+  EXPECT_EQ(frame->left()->at(9, 0), wanted);
 }
 
 TEST_F(FrameRingTest, MemoryThatTheSenderTakesBackReadsAsBlack) {
   const auto frame = ring_->take(frame_in(0));
   ASSERT_TRUE(frame);
   ASSERT_EQ(::fallocate(memory_.number(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(kLayout.bytes())), 0);
-  EXPECT_EQ(frame->left->at(9, 9), 0);
+  EXPECT_EQ(frame->left()->at(9, 9), 0);
 }
 
 TEST_F(FrameRingTest, NoSlotBeyondTheLast) {

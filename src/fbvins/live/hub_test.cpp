@@ -102,7 +102,7 @@ TEST(Hub, ImagesThatWaitAreFewForTheirMemory) {
   Hub hub({.events = 1000, .images = 2});
   hub.add(std::make_unique<Hanging>(slow, go));
   hub.publish(reading(0));  // may be taken at once
-  for (std::int64_t t = 1; t <= 20; ++t) hub.publish(StereoFrame{Time{t}, nullptr, nullptr}), hub.publish(reading(100 + t));
+  for (std::int64_t t = 1; t <= 20; ++t) hub.publish(StereoFrame{Time{t}}), hub.publish(reading(100 + t));
   go.count_down();
   ASSERT_TRUE(hub.finish());
   EXPECT_EQ(hub.reports()[0].dropped, 18);

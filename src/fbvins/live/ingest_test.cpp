@@ -28,7 +28,7 @@ struct Fixture {
   }
   void see(std::int64_t t_ms, std::uint8_t left, std::uint8_t right) {
     now = ms(1000 + t_ms);
-    ingest.push(StereoFrame{ms(t_ms), image(left), image(right)});
+    ingest.push(StereoFrame{ms(t_ms), {image(left), image(right)}});
   }
   /// The clock is known, nothing waits.
   void begin() {
@@ -112,8 +112,8 @@ TEST(Ingest, AFrozenCameraGivesNoImage) {
   f.see(50, 2, 101);  // the right camera repeats itself
   const auto event = f.ingest.pop();
   const auto& frame = std::get<StereoFrame>(*event);
-  EXPECT_NE(frame.left, nullptr);
-  EXPECT_EQ(frame.right, nullptr);
+  EXPECT_NE(frame.left(), nullptr);
+  EXPECT_EQ(frame.right(), nullptr);
   EXPECT_EQ(f.ingest.counts().images_incomplete, 1);
   EXPECT_EQ(*f.ingest.arrivals().cameras[0].image, ms(1050));
   EXPECT_EQ(*f.ingest.arrivals().cameras[1].image, ms(1000));
@@ -137,14 +137,15 @@ TEST(Ingest, EveryCameraIsWatched) {
   for (std::int64_t t = 0; t <= 400; t += 50) {
     now = ms(1000 + t);
     const auto n = static_cast<std::uint8_t>(t / 50);
-    StereoFrame frame{ms(t), image(n), image(static_cast<std::uint8_t>(n + 50))};
-    frame.more = {t < 200 ? image(static_cast<std::uint8_t>(n + 100)) : nullptr,
-                  image(static_cast<std::uint8_t>(150 + std::min<int>(n, 5)))};
+    StereoFrame frame{
+        ms(t),
+        {image(n), image(static_cast<std::uint8_t>(n + 50)), t < 200 ? image(static_cast<std::uint8_t>(n + 100)) : nullptr,
+         image(static_cast<std::uint8_t>(150 + std::min<int>(n, 5)))}};
     ingest.push(std::move(frame));
     const auto event = ingest.pop_waiting();
     ASSERT_TRUE(event);
     const auto& taken = std::get<StereoFrame>(*event);
-    EXPECT_TRUE(taken.left && taken.right);
+    EXPECT_TRUE(taken.left() && taken.right());
     EXPECT_EQ(taken.image(3) != nullptr, t <= 250) << t;
   }
   const Ingest::Arrival arrivals = ingest.arrivals();
@@ -167,10 +168,8 @@ TEST(Ingest, CamerasMayDeliverAlone) {
   for (std::int64_t t = 0; t < 60; t += 6) {  // closer together than an image that comes twice
     now = ms(1000 + t);
     const auto n = static_cast<std::uint8_t>(t);
-    one.push(StereoFrame{ms(t), image(n), nullptr});
-    StereoFrame frame{ms(t), nullptr, nullptr};
-    frame.more = {image(n)};
-    three.push(std::move(frame));
+    one.push(StereoFrame{ms(t), {image(n)}});
+    three.push(StereoFrame{ms(t), {nullptr, nullptr, image(n)}});
     EXPECT_TRUE(one.pop_waiting() && three.pop_waiting()) << t;
   }
   EXPECT_EQ(one.counts().images_incomplete, 0);
@@ -184,7 +183,7 @@ TEST(Ingest, AnImageThatComesTwiceIsOne) {
     f.see(t, static_cast<std::uint8_t>(t / 50), static_cast<std::uint8_t>(t / 50 + 100));
     const auto event = f.ingest.pop_waiting();
     ASSERT_TRUE(event);
-    EXPECT_NE(std::get<StereoFrame>(*event).left, nullptr);
+    EXPECT_NE(std::get<StereoFrame>(*event).left(), nullptr);
     f.see(t + 1, static_cast<std::uint8_t>(t / 50), static_cast<std::uint8_t>(t / 50 + 100));
     EXPECT_FALSE(f.ingest.pop_waiting());
   }
@@ -198,7 +197,7 @@ TEST(Ingest, AReadingOrAnImageThatIsLateChangesNoOtherStamp) {
     f.read(t, t == 1000 ? t - 150 : t);
     if (t % 50 != 0) continue;
     f.now = ms(1000 + t);
-    f.ingest.push(StereoFrame{ms(t == 2000 ? t - 150 : t), image(static_cast<std::uint8_t>(t / 50)), image(255)});
+    f.ingest.push(StereoFrame{ms(t == 2000 ? t - 150 : t), {image(static_cast<std::uint8_t>(t / 50)), image(255)}});
     EXPECT_TRUE(t == 2000 || f.ingest.arrivals().newest == ms(t));
     ++images;
   }
@@ -238,7 +237,7 @@ TEST(Ingest, TheFirstImageAfterAClockWasSetBackSaysSo) {
     for (std::int64_t t = 0; t < 4000; t += 1) {
       const std::int64_t back = t < 2000 ? 0 : 1000;
       f.now = ms(1000 + t);
-      if (t % 50 == offset_ms) f.ingest.push(StereoFrame{ms(t - back), image(static_cast<std::uint8_t>(t / 50)), image(255)});
+      if (t % 50 == offset_ms) f.ingest.push(StereoFrame{ms(t - back), {image(static_cast<std::uint8_t>(t / 50)), image(255)}});
       if (t % 5 == 0) f.ingest.push(reading(t - back));
       while (const auto event = f.ingest.pop_waiting())
         if (const auto* frame = std::get_if<StereoFrame>(&*event); frame && frame->after_clock_step) marked.push_back(frame->t);
@@ -291,7 +290,7 @@ TEST(Ingest, TwoThreadsMayPush) {
   });
   std::jthread camera([&] {
     for (std::int64_t t = 1; t <= 200; ++t)
-      ingest.push(StereoFrame{ms(4000 + 10 * t), image(static_cast<std::uint8_t>(t)), image(static_cast<std::uint8_t>(t + 7))});
+      ingest.push(StereoFrame{ms(4000 + 10 * t), {image(static_cast<std::uint8_t>(t)), image(static_cast<std::uint8_t>(t + 7))}});
   });
   std::jthread closer([&] {
     imu.join(), camera.join();

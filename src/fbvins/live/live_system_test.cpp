@@ -103,8 +103,8 @@ struct Fixture {
   ImuSample reading(int k) const { return motion.sample(flight.stamp(0) + Duration::from_seconds(k * 0.005), flight.bias); }
   StereoFrame image(int k) {
     ++pixel;
-    return {flight.stamp(k), std::make_shared<Image>(8, 8, pixel),
-            std::make_shared<Image>(8, 8, static_cast<std::uint8_t>(pixel + 1))};
+    const auto left = std::make_shared<Image>(8, 8, pixel);
+    return {flight.stamp(k), {left, std::make_shared<Image>(8, 8, static_cast<std::uint8_t>(pixel + 1))}};
   }
   /// Image k and the readings up to the next one; waits for the estimate, so that nothing is dropped.
   void play(LiveSystem& live, int first, int last) {

@@ -21,8 +21,8 @@ using namespace std::chrono_literals;
 
 StereoRig small_rig() {
   StereoRig rig;
-  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24), {}});
+  rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   return rig;
 }
 
@@ -73,8 +73,8 @@ TEST_F(RecordSinkTest, EveryEventHasItsTopic) {
   const auto take = [&](const LiveEvent& event) { EXPECT_TRUE(sink->take(event)); };
   take(LiveStatus{});  // before any sensor: at no time
   take(ImuSample{at(0)});
-  take(StereoFrame{at(0), image, image});
-  take(StereoFrame{at(50), image, nullptr});
+  take(StereoFrame{at(0), {image, image}});
+  take(StereoFrame{at(50), {image}});
   take(odometry);  // without a pose: its health only
   take(pose);
   take(map);  // not localised: nothing to say
@@ -120,7 +120,7 @@ TEST_F(RecordSinkTest, AKillLeavesAReadableFile) {
     const auto image = std::make_shared<const Image>(32, 24, std::uint8_t{9});
     for (int i = 0;; ++i) {
       (void)sink->take(ImuSample{at(5 * i)});
-      (void)sink->take(StereoFrame{at(5 * i), image, image});
+      (void)sink->take(StereoFrame{at(5 * i), {image, image}});
       if (i > 200) std::this_thread::sleep_for(1ms);
     }
   }

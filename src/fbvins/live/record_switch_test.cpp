@@ -20,8 +20,8 @@ class RecordSwitchTest : public ::testing::Test {
  protected:
   RecordSwitchTest() {
     fs::create_directories(folder);
-    rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-    rig.T_BC1.p = Vec3(0.1, 0, 0);
+    rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24), {}});
+    rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
   }
   ~RecordSwitchTest() override { fs::remove_all(folder); }
 
@@ -38,7 +38,7 @@ class RecordSwitchTest : public ::testing::Test {
       t = t + Duration{5'000'000};
     }
     const auto image = std::make_shared<const Image>(32, 24, std::uint8_t{9});
-    ASSERT_TRUE(record.take(StereoFrame{t, image, image}));
+    ASSERT_TRUE(record.take(StereoFrame{t, {image, image}}));
   }
 
   const std::string folder = ::testing::TempDir() + "/fbvins_record_switch_" + std::to_string(getpid());

@@ -40,15 +40,15 @@ class ReplaySourceTest : public ::testing::Test {
  protected:
   ReplaySourceTest() {
     StereoRig rig;
-    rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-    rig.T_BC1.p = Vec3(0.1, 0, 0);
+    rig.cameras.assign(2, {Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24), {}});
+    rig.cameras[1].T_BC.p = Vec3(0.1, 0, 0);
     auto record = FlightRecord::create(path_, rig);
     EXPECT_TRUE(record);
     for (int k = 0; k < kImages * kReadingsPerImage; ++k) {
       EXPECT_TRUE(record->add(ImuSample{at(5 * k), Vec3::Zero(), Vec3(0, 0, 9.81)}));
       if (k % kReadingsPerImage != 0) continue;
       const auto image = std::make_shared<Image>(32, 24, static_cast<std::uint8_t>(k));
-      EXPECT_TRUE(record->add(StereoFrame{at(5 * k), image, image}));
+      EXPECT_TRUE(record->add(StereoFrame{at(5 * k), {image, image}}));
     }
     EXPECT_TRUE(record->finish());
   }

@@ -14,8 +14,8 @@ struct Look {
 
   std::vector<SensorFinding> findings() const {
     StereoRig rig;
-    rig.left = rig.right = Camera(PinholeRadtan{5, 5, 4, 3}, 8, 6);
-    rig.more.push_back({rig.left, {}});
+    rig.cameras.assign(2, {Camera(PinholeRadtan{5, 5, 4, 3}, 8, 6), {}});
+    rig.cameras.push_back({rig.left(), {}});
     Time now;
     SensorCheck check(rig, 1, [&] { return now; });
     int image = 0, reading = 0;
@@ -28,9 +28,9 @@ struct Look {
         const auto pixels = [&](bool still, int across) {
           return std::make_shared<Image>(across, 6, static_cast<std::uint8_t>(still ? 1 : image));
         };
-        StereoFrame frame{t + Duration::from_seconds(image_stamp_offset_s), pixels(freeze == 0, width), nullptr};
-        if (alone != 1) frame.right = pixels(freeze == 1, 8);
-        frame.more = {alone == 2 ? nullptr : pixels(freeze == 2, 8)};
+        StereoFrame frame{t + Duration::from_seconds(image_stamp_offset_s), {pixels(freeze == 0, width)}};
+        if (alone != 1) frame.set_image(1, pixels(freeze == 1, 8));
+        if (alone != 2) frame.set_image(2, pixels(freeze == 2, 8));
         check.push(std::move(frame));
       }
     }

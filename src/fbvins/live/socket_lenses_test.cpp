@@ -35,25 +35,26 @@ TEST(SocketLenses, EveryModelComesAsItWas) {
   static_assert(std::size(models) == std::variant_size_v<LensModel>);
   for (const LensModel& model : models) {
     StereoRig rig = test::socket_test_rig();
-    rig.right = Camera(model, test::kWidth, test::kHeight);
+    rig.cameras[1].camera = Camera(model, test::kWidth, test::kHeight);
     const FbvinsSocketHello hello = hello_message(&rig);
     const auto message = parse_socket_message(bytes_of(hello));
     ASSERT_TRUE(message) << message.error().message;
     const SocketRig& sent = *std::get<SocketHello>(*message).rig;
-    EXPECT_EQ(sent.lenses.has_value(), rig.right.distortion().size() > 4) << rig.right.model_name();
+    EXPECT_EQ(sent.lenses.has_value(), rig.right().distortion().size() > 4) << rig.right().model_name();
     const auto back = parse_socket_rig(sent, test::kWidth, test::kHeight);
     ASSERT_TRUE(back) << back.error().message;
-    EXPECT_EQ(back->right.model_name(), rig.right.model_name());
-    EXPECT_EQ(back->right.intrinsics(), rig.right.intrinsics());
-    EXPECT_EQ(back->right.distortion(), rig.right.distortion());
-    EXPECT_EQ(back->left.distortion(), rig.left.distortion());
+    EXPECT_EQ(back->right().model_name(), rig.right().model_name());
+    EXPECT_EQ(back->right().intrinsics(), rig.right().intrinsics());
+    EXPECT_EQ(back->right().distortion(), rig.right().distortion());
+    EXPECT_EQ(back->left().distortion(), rig.left().distortion());
     EXPECT_TRUE(same(sent, socket_rig(*back)));
   }
 }
 
 TEST(SocketLenses, WhatIsMissingIsRefused) {
   StereoRig rig = test::socket_test_rig();
-  rig.left = Camera(PinholeRadtan5{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002, 0.015625}, test::kWidth, test::kHeight);
+  rig.cameras[0].camera =
+      Camera(PinholeRadtan5{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002, 0.015625}, test::kWidth, test::kHeight);
   FbvinsSocketHello hello = hello_message(&rig);
   hello.flags &= ~std::uint32_t{FBVINS_SOCKET_HAS_LENSES};
   EXPECT_EQ(

@@ -30,12 +30,12 @@ TEST(SocketMessage, HelloWithItsCalibrationAsSent) {
   EXPECT_EQ(hello.layout.offset_bytes[1], test::kSlotBytes / 2);
   const auto sent = parse_socket_rig(*hello.rig, test::kWidth, test::kHeight);
   ASSERT_TRUE(sent);
-  EXPECT_EQ(sent->T_BC0.R(), rig.T_BC0.R());
-  EXPECT_EQ(sent->T_BC1.p, rig.T_BC1.p);
+  EXPECT_EQ(sent->T_BC0().R(), rig.T_BC0().R());
+  EXPECT_EQ(sent->T_BC1().p, rig.T_BC1().p);
   EXPECT_EQ(sent->time_offset_s, rig.time_offset_s);
   EXPECT_EQ(sent->imu_noise.accel_random_walk_mps3_rthz, rig.imu_noise.accel_random_walk_mps3_rthz);
-  EXPECT_EQ(std::get<PinholeRadtan>(sent->right.model()).k1, -0.125);
-  EXPECT_EQ(sent->right.width(), test::kWidth);
+  EXPECT_EQ(std::get<PinholeRadtan>(sent->right().model()).k1, -0.125);
+  EXPECT_EQ(sent->right().width(), test::kWidth);
 }
 
 TEST(SocketMessage, HelloOfALaterMinorVersionMayBeLonger) {
@@ -284,8 +284,8 @@ TEST(SocketMessage, MessagesOfVersionOneOneAreShorter) {
 TEST(SocketMessage, HelloOfOneToEightCameras) {
   StereoRig rig = test::socket_test_rig();
   for (int i = 2; i < 8; ++i) {
-    rig.more.push_back(rig.mounted(0));
-    rig.more.back().T_BC.p.z() = 0.25 * i;
+    rig.cameras.push_back(rig.mounted(0));
+    rig.cameras.back().T_BC.p.z() = 0.25 * i;
   }
   FbvinsSocketHello hello = hello_message(&rig);
   hello.slot_bytes = 8 * test::kImageBytes;
@@ -409,7 +409,7 @@ TEST(SocketMessage, NothingAndUnknownTypes) {
 TEST(SocketMessage, CamerasHaveTimesOfTheirOwnSinceVersion14) {
   StereoRig rig = test::socket_test_rig();
   EXPECT_FALSE(socket_rig(rig).times) << "where all are alike nothing is said of each";
-  rig.right.set_own_times({0.00390625, 0.0000152587890625});
+  rig.cameras[1].camera.set_own_times({0.00390625, 0.0000152587890625});
   FbvinsSocketHello hello = hello_message(&rig);
   const auto message = parse_socket_message(bytes_of(hello));
   ASSERT_TRUE(message) << message.error().message;

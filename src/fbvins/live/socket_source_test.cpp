@@ -47,9 +47,9 @@ TEST_F(SocketSourceTest, ReadingsAndFramesArriveAsTheyWereSent) {
   const auto frames = inbox_.frames(1);
   ASSERT_EQ(frames.size(), 1u);
   EXPECT_EQ(frames[0].t, Time{20});
-  EXPECT_TRUE(frames[0].left->foreign());
-  EXPECT_EQ(frames[0].left->at(7, 9), static_cast<std::uint8_t>(3 * (9 * test::kWidth + 7)));
-  EXPECT_EQ(frames[0].right->at(7, 9), static_cast<std::uint8_t>(5 * (9 * test::kWidth + 7)));
+  EXPECT_TRUE(frames[0].left()->foreign());
+  EXPECT_EQ(frames[0].left()->at(7, 9), static_cast<std::uint8_t>(3 * (9 * test::kWidth + 7)));
+  EXPECT_EQ(frames[0].right()->at(7, 9), static_cast<std::uint8_t>(5 * (9 * test::kWidth + 7)));
 }
 
 TEST_F(SocketSourceTest, SlotsComeBackWhenTheirFramesAreGone) {
@@ -76,7 +76,7 @@ TEST_F(SocketSourceTest, WhoeverKeepsFramesLeavesTheSenderItsSlots) {
   }
   const auto frames = inbox_.frames(12);
   ASSERT_EQ(frames.size(), 12u);
-  for (std::size_t round = 0; round < 10; ++round) EXPECT_EQ(frames[2 + round].left->at(0, 0), round);
+  for (std::size_t round = 0; round < 10; ++round) EXPECT_EQ(frames[2 + round].left()->at(0, 0), round);
 }
 
 TEST_F(SocketSourceTest, ASenderThatCrashesIsFollowedByTheNext) {
@@ -89,7 +89,7 @@ TEST_F(SocketSourceTest, ASenderThatCrashesIsFollowedByTheNext) {
   }  // the connection breaks while its frames are still held
   EXPECT_TRUE(inbox_.hears("tester: left without a goodbye (2 frames, 3 missed, 0 readings, 0 refused)"));
   EXPECT_EQ(inbox_.frames(6)[5].t, Time{202});
-  EXPECT_EQ(inbox_.frames(6)[5].right->at(3, 3), 0);  // its pixels are there
+  EXPECT_EQ(inbox_.frames(6)[5].right()->at(3, 3), 0);  // its pixels are there
   expect_service();
 }
 
@@ -220,12 +220,12 @@ TEST_F(SocketSourceWithoutRig, TakesTheFirstSendersCalibrationAndKeepsToIt) {
   senders.join();
   EXPECT_EQ(welcome, std::uint32_t{FBVINS_SOCKET_WELCOME});
   EXPECT_TRUE(inbox_.hears("no calibration: neither here nor in the hello"));
-  EXPECT_EQ(source_->rig().T_BC1.p, rig.T_BC1.p);
-  EXPECT_EQ(source_->rig().left.width(), test::kWidth);
+  EXPECT_EQ(source_->rig().T_BC1().p, rig.T_BC1().p);
+  EXPECT_EQ(source_->rig().left().width(), test::kWidth);
   EXPECT_TRUE(inbox_.hears("tester: left"));
 
   StereoRig other = rig;
-  other.T_BC1.p.x() += 1e-6;
+  other.cameras[1].T_BC.p.x() += 1e-6;
   {
     TestSender sender(path());
     EXPECT_EQ(sender.begin(&other), std::uint32_t{FBVINS_SOCKET_GOODBYE});

@@ -32,9 +32,10 @@ StereoRig looking_ahead() {
   Mat3 R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   StereoRig rig;
-  rig.right = Camera(PinholeRadtan{100, 100, 32, 24}, 64, 48);
-  rig.T_BC0 = {Quat(R), Vec3(0.1, 0, 0)};
-  rig.more.push_back({rig.right, {Quat(R) * Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitY())), Vec3(-0.2, 0, 0)}});  // backwards
+  rig.cameras.resize(2);
+  rig.cameras[1].camera = Camera(PinholeRadtan{100, 100, 32, 24}, 64, 48);
+  rig.cameras[0].T_BC = {Quat(R), Vec3(0.1, 0, 0)};
+  rig.cameras.push_back({rig.right(), {Quat(R) * Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitY())), Vec3(-0.2, 0, 0)}});  // backwards
   return rig;
 }
 
@@ -58,7 +59,7 @@ TEST(ViewMaker, FeaturesAreThoseOfTheirCamera) {
 
 TEST(ViewMaker, WhatTheRightCameraSeesIsThereAsWell) {
   StereoRig rig = looking_ahead();
-  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+  rig.cameras[1].T_BC = rig.T_BC0();
   ViewMaker views(rig);
   TrackedFrame frame = frame_with(Time{7}, {1, 2});
   frame.features[0].right.emplace().pixel = Vec2(3, 4);

@@ -85,12 +85,12 @@ std::optional<EarlierView> EarlierViews::best_for(const Keyframe& keyframe, cons
 void EarlierViews::add(const Keyframe& keyframe, const Pose<G, C0>& T_GC) {
   if (keyframe.reset_counter != reset_counter_) seen_.clear();
   reset_counter_ = keyframe.reset_counter;
-  if (!keyframe.images.left) return;
+  if (!keyframe.images.left()) return;
   if (!seen_.empty()) {
     const Pose<C0, C0> moved = seen_.back().T_GC.inverse() * T_GC;
     if (moved.p.norm() < kSameView_m && so3_log(moved.q).norm() < kSameView_rad) return;
   }
-  seen_.push_back({keyframe.t, keyframe.images.left, T_GC});
+  seen_.push_back({keyframe.t, keyframe.images.left(), T_GC});
   if (seen_.size() > kMostViews) seen_.pop_front();
 }
 

@@ -4,7 +4,7 @@
 // thread at a time.
 //
 //   EarlierViews views(rig);
-//   if (auto view = views.best_for(keyframe, T_GC)) depths.set(keyframe.images.left->view(), view->image->view(), view->from);
+//   if (auto view = views.best_for(keyframe, T_GC)) depths.set(keyframe.images.left()->view(), view->image->view(), view->from);
 //   views.add(keyframe, T_GC);
 #pragma once
 
@@ -26,7 +26,7 @@ struct EarlierView {
 
 class EarlierViews {
  public:
-  explicit EarlierViews(const StereoRig& rig) : lens_(rig.left), T_BC0_(rig.T_BC0) {}
+  explicit EarlierViews(const StereoRig& rig) : lens_(rig.left()), T_BC0_(rig.T_BC0()) {}
 
   /// The one in which most of the keyframe's landmarks are seen with a depth; `T_GC`: the camera when it took its image. None
   /// where no view shows enough of them from far enough away: after a restart of the odometry, in a turn on the spot, in a long

@@ -36,7 +36,7 @@ Hit hit(const Pose<G, C0>& T_GC, const Vec2& xy) {
 
 StereoRig small_rig() {
   StereoRig rig = test_room::rig();
-  rig.left = rig.right = Camera(PinholeRadtan{230, 230, 188, 120}, 376, 240);
+  for (MountedCamera& mounted : rig.cameras) mounted.camera = Camera(PinholeRadtan{230, 230, 188, 120}, 376, 240);
   return rig;
 }
 
@@ -48,16 +48,16 @@ Pose<G, B> pose(double x, double y, double yaw_deg, double roll_deg = 0) {
 Keyframe keyframe(int number, const Pose<G, B>& T_GB, double t_s = 0) {
   static const NoiseTexture texture(3, 20);
   const StereoRig rig = small_rig();
-  const Pose<G, C0> T_GC = T_GB * rig.T_BC0;
-  const auto xy = [&](const Vec2& px) { return *rig.left.undistort(px); };
+  const Pose<G, C0> T_GC = T_GB * rig.T_BC0();
+  const auto xy = [&](const Vec2& px) { return *rig.left().undistort(px); };
   Keyframe k = test_room::keyframe(FrameId{number}, Time{} + Duration::from_seconds(t_s > 0 ? t_s : 0.3 * number), T_GB);
   k.images.t = k.t;
-  k.images.left = std::make_shared<const Image>(render_texture(
-      752, 480, texture, [&](const Vec2& px) { return hit(T_GC, xy(px)).on_wall; }, 128, 40));
+  k.images.set_image(0, std::make_shared<const Image>(render_texture(
+                            752, 480, texture, [&](const Vec2& px) { return hit(T_GC, xy(px)).on_wall; }, 128, 40)));
   for (int v = 15; v < 240; v += 30)
     for (int u = 15; u < 376; u += 30) {
       const Vec2 px(u, v);
-      k.landmarks.push_back({TrackId{u * 1000 + v}, px, rig.T_BC0 * Vec3(hit(T_GC, xy(px)).distance_m * xy(px).homogeneous())});
+      k.landmarks.push_back({TrackId{u * 1000 + v}, px, rig.T_BC0() * Vec3(hit(T_GC, xy(px)).distance_m * xy(px).homogeneous())});
     }
   return k;
 }
@@ -72,7 +72,7 @@ struct Depths {
 /// Against the truth, with three standard deviations.
 Depths depths_of(const Place& place, const Pose<G, B>& T_GB) {
   Depths out;
-  const Pose<G, C0> T_GC = T_GB * small_rig().T_BC0;
+  const Pose<G, C0> T_GC = T_GB * small_rig().T_BC0();
   for (const PlaceFeature& f : place.features) {
     if (!f.has_depth()) continue;
     const double off = (f.inverse_depth - 1 / hit(T_GC, f.xy()).distance_m) / f.sigma_inverse_depth;
@@ -111,7 +111,7 @@ TEST(EarlierViews, GiveDepthsOfWhatIsSeenFromAnotherPlace) {
 
 TEST(EarlierViews, ShowNoDepthFromATurnOnTheSpot) {
   PlaceExtractor one = extractor();
-  const Vec3 lens = small_rig().T_BC0.p;
+  const Vec3 lens = small_rig().T_BC0().p;
   const auto about_the_lens = [&](double yaw_deg) {
     Pose<G, B> T = pose(0, 0, yaw_deg);
     T.p -= T.q * lens;
@@ -167,7 +167,7 @@ TEST(EarlierViews, AreKeptInAHover) {
 /// The nearest view measures worse than one that is farther away.
 TEST(EarlierViews, TheOneThatMeasuresDepthsBestIsTaken) {
   EarlierViews views(small_rig());
-  const Pose<B, C0> T_BC0 = small_rig().T_BC0;
+  const Pose<B, C0> T_BC0 = small_rig().T_BC0();
   const Pose<G, B> before[] = {pose(0, 0.5, 60), pose(0, 0, 0), pose(0, 0.05, 0), pose(0, 0.12, 0)};  // the first looks elsewhere
   for (int i = 0; i < 4; ++i) views.add(keyframe(i, before[i]), before[i] * T_BC0);
   const Pose<G, B> now = pose(0, 0.18, 0);

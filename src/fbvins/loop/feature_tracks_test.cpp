@@ -16,7 +16,7 @@ using namespace test_room;
 /// The true poses of a flight, without loops.
 PlaceMap true_map(int keyframes) {
   PlaceMap map;
-  map.cameras[0] = rig().T_BC0;
+  map.cameras[0] = rig().T_BC0();
   for (Frame& f : flight(room(1), keyframes, 0, 0, 5)) {
     MapKeyframe k;
     k.t = f.t, k.T_GB = f.truth, k.T_MB = Pose<M, B>(f.truth.q, f.truth.p), k.place = std::move(f.place);

@@ -162,7 +162,7 @@ TEST(FinalAdjustment, SameBitsAndNothingToDo) {
   PlaceMap nothing;
   EXPECT_EQ(adjust_map(nothing, {}).points, 0);
   PlaceMap alone;
-  alone.cameras[0] = rig().T_BC0;
+  alone.cameras[0] = rig().T_BC0();
   alone.add(a.map.keyframes()[0]);
   const PlaceMap before = alone;
   EXPECT_EQ(adjust_map(alone, {}).points, 0);

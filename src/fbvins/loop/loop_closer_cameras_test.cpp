@@ -23,7 +23,7 @@ PlaceMap of_cameras_that_look_ahead(const std::vector<Frame>& frames) {
 /// Where the body is when its camera that looks back is where the one that looks ahead was.
 Pose<G, B> turned(const Pose<G, B>& T_GB) {
   const StereoRig quad = rig_that_looks_back();
-  return T_GB * quad.T_BC0 * quad.T_BC(2).inverse();
+  return T_GB * quad.T_BC0() * quad.T_BC(2).inverse();
 }
 
 TEST(LoopCloserCameras, AFlightThatLooksTheOtherWayIsFoundByTheCameraThatLooksBack) {
@@ -54,7 +54,7 @@ TEST(LoopCloserCameras, APairWhoseLeftCameraDiedGoesOnInTheMap) {
   const auto frames = flight(room(1), 200, 0.004, 0.05, 2);
   const StereoRig pair = rig();
   LoopCloser closer(pair, {}, vocabulary());
-  const Pose<B, B> right_for_left = (pair.T_BC0 * pair.T_BC1.cast_frames<B, C0>().inverse());
+  const Pose<B, B> right_for_left = (pair.T_BC0() * pair.T_BC1().cast_frames<B, C0>().inverse());
   int loops = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const bool left = i < 100;  // then the right camera sees, from where the left one was

@@ -84,7 +84,7 @@ Keyframe seconds_later(int number, double x_m, double yaw_rad = 0) {
   const Time before = k.t - Duration::from_seconds(1);
   k.imu.segments = {{{{before, Vec3::Zero(), Vec3(0, 0, 9.81)}, {k.t, Vec3::Zero(), Vec3(0, 0, 9.81)}}, k.t - before}};
   static const auto plain = std::make_shared<const Image>(752, 480);
-  k.images.left = plain;
+  k.images.set_image(0, plain);
   return k;
 }
 
@@ -93,7 +93,7 @@ TEST(LoopCloser, AKeyframeWithoutImagesBecomesNoPlace) {
   closer.process(seconds_later(0, 0));
   for (int i = 1; i < 5; ++i) {
     Keyframe k = seconds_later(i, i);
-    k.images.left = nullptr;
+    k.images.set_image(0, nullptr);
     EXPECT_TRUE(closer.process(k).localised);
   }
   EXPECT_EQ(closer.map().size(), 1u);

@@ -38,7 +38,7 @@ Keyframe before_a_wall(int number, double x_m) {
   k.id = FrameId{number};
   k.t = Time{} + Duration::from_seconds(number);
   k.gauge.T_GB.p.y() = x_m;
-  k.images = {k.t, image(shift_px), image(shift_px + test_room::kFocal * test_room::kBaseline / kDepth_m)};
+  k.images = {k.t, {image(shift_px), image(shift_px + test_room::kFocal * test_room::kBaseline / kDepth_m)}};
   return k;
 }
 
@@ -83,8 +83,8 @@ TEST_F(OpenedMap, IsMadeByThePairWhicheverItsNumbers) {
     EXPECT_TRUE(map.ok()) << map.error().message;
     for (int i = 0; i < 2; ++i) {
       Keyframe k = before_a_wall(i, 0.15 * i);
-      if (of_three) k.images.more = {std::exchange(k.images.right, std::make_shared<const Image>(752, 480))};
-      if (!rig.has_right()) k.images.right.reset();
+      if (of_three) k.images.images.insert(k.images.images.begin() + 1, std::make_shared<const Image>(752, 480));
+      if (!rig.has_right()) k.images.set_image(1, nullptr);
       (*map)->process(k);
     }
     (*map)->finish();
@@ -92,7 +92,7 @@ TEST_F(OpenedMap, IsMadeByThePairWhicheverItsNumbers) {
   };
   EXPECT_TRUE(made(three, true) == made(pair, false));
   const StereoRig apart = with_cameras(
-      pair, {pair.mounted(0), behind, {behind.camera, {pair.T_BC0.q * Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), {}}}});
+      pair, {pair.mounted(0), behind, {behind.camera, {pair.T_BC0().q * Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), {}}}});
   const std::string bytes = made(apart, true);
   const auto map = parse_map(std::as_bytes(std::span(bytes)), "apart");
   ASSERT_TRUE(map.ok()) << map.error().message;

@@ -14,7 +14,7 @@ using namespace test_room;
 
 /// Adds a session with keyframes at `count` poses of the rounds, `step_s` apart, as they look in `world`.
 void add_session(PlaceMap& map, const World& world, std::uint32_t session, int count, double step_s, Rng& rng) {
-  map.cameras[0] = rig().T_BC0;
+  map.cameras[0] = rig().T_BC0();
   for (int i = 0; i < count; ++i) {
     const Pose<G, B> T = true_pose(step_s * i);
     MapKeyframe k;

@@ -18,9 +18,8 @@ Keyframe keyframe(const StereoRig& rig, const std::vector<int>& missing = {}) {
       752, 480, texture, [](const Vec2& px) { return px; }, 128, 40));
   const auto of = [&](int camera) { return std::ranges::count(missing, camera) > 0 ? nullptr : image; };
   Keyframe k = test_room::keyframe(FrameId{1}, Time{}, {});
-  k.images.left = of(0);
-  if (rig.has_right()) k.images.right = of(1);
-  for (int camera = 2; camera < rig.camera_count(); ++camera) k.images.more.push_back(of(camera));
+  k.images.images.clear();
+  for (int camera = 0; camera < rig.camera_count(); ++camera) k.images.images.push_back(of(camera));
   return k;
 }
 

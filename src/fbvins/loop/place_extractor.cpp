@@ -35,7 +35,7 @@ std::optional<Pose<C1, C0>> between_exposures(const StereoRig& rig, const Keyfra
   if (keyframe.images.offsets.of(0) == keyframe.images.offsets.of(1)) return rig.T_C1C0();
   const auto left = at_exposure(keyframe, 0), right = at_exposure(keyframe, 1);
   if (!left || !right) return std::nullopt;
-  return (*right * rig.T_BC1).inverse() * (*left * rig.T_BC0);
+  return (*right * rig.T_BC1()).inverse() * (*left * rig.T_BC0());
 }
 
 }  // namespace
@@ -46,7 +46,7 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
       vocabulary_(std::move(vocabulary)),
       stage_(std::move(stage)),
       orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()),
-      depths_(rig.left.focal_px()),
+      depths_(rig.left().focal_px()),
       earlier_(rig) {
   if (rig.depth) depth_.emplace(rig);
 }
@@ -54,7 +54,7 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
 Place PlaceExtractor::extract(const Keyframe& keyframe) {
   const std::optional<Pose<G, C0>> T_GC = left_camera(keyframe);
   const StereoFrame& images = keyframe.images;
-  const bool left_alone = images.left && T_GC && !images.right && !has_depth_image(images);
+  const bool left_alone = images.left() && T_GC && !images.right() && !has_depth_image(images);
   bool second = false;
   if (left_alone) second = look_back(keyframe, *T_GC);
   else if (const auto T_C1C0 = between_exposures(rig_, keyframe)) second = look_right(images, *T_C1C0);
@@ -70,7 +70,7 @@ void PlaceExtractor::remember(const Keyframe& keyframe) {
 /// When it took its image. None without readings.
 std::optional<Pose<G, C0>> PlaceExtractor::left_camera(const Keyframe& keyframe) const {
   const std::optional<Pose<B, B>> moved = at_exposure(keyframe, 0);
-  return moved ? std::optional(keyframe.gauge.T_GB * *moved * rig_.T_BC0) : std::nullopt;
+  return moved ? std::optional(keyframe.gauge.T_GB * *moved * rig_.T_BC0()) : std::nullopt;
 }
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
@@ -80,15 +80,15 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
 bool PlaceExtractor::has_depth_image(const StereoFrame& images) const { return depth_ && depth_->is_usable(images.depth.get()); }
 
 bool PlaceExtractor::look_right(const StereoFrame& images, const Pose<C1, C0>& T_C1C0) {
-  if (!images.left || !images.right) return false;
-  depths_.set(images.left->view(), images.right->view(), {&rig_.right, T_C1C0.R(), T_C1C0.p});
+  if (!images.left() || !images.right()) return false;
+  depths_.set(images.left()->view(), images.right()->view(), {&rig_.right(), T_C1C0.R(), T_C1C0.p});
   return true;
 }
 
 bool PlaceExtractor::look_back(const Keyframe& keyframe, const Pose<G, C0>& T_GC) {
   const std::optional<EarlierView> earlier = earlier_.best_for(keyframe, T_GC);
   if (!earlier) return false;
-  depths_.set(keyframe.images.left->view(), earlier->image->view(), earlier->from);
+  depths_.set(keyframe.images.left()->view(), earlier->image->view(), earlier->from);
   const std::optional<double> nearer = nearer_than(keyframe.landmarks);
   if (!nearer || std::abs(*nearer - 1) > kMostNearer) return false;
   depths_.stretch(*nearer);
@@ -97,11 +97,11 @@ bool PlaceExtractor::look_back(const Keyframe& keyframe, const Pose<G, C0>& T_GC
 
 /// By what factor the second view shows landmarks nearer than they are, in the median (L32): many images have measured them.
 std::optional<double> PlaceExtractor::nearer_than(const std::vector<KeyframeLandmark>& landmarks) {
-  const Pose<C0, B> T_CB = rig_.T_BC0.inverse();
+  const Pose<C0, B> T_CB = rig_.T_BC0().inverse();
   std::vector<double> factors;
   for (const KeyframeLandmark& landmark : landmarks) {
     const double z = (T_CB * landmark.p_B).z();
-    const auto xy = rig_.left.undistort(landmark.pixel);
+    const auto xy = rig_.left().undistort(landmark.pixel);
     if (!xy || !(z > 0)) continue;
     const auto depth = depths_.at(landmark.pixel, *xy);
     if (depth && depth->sigma < kSureDepth * depth->value) factors.push_back(depth->value * z);
@@ -112,11 +112,11 @@ std::optional<double> PlaceExtractor::nearer_than(const std::vector<KeyframeLand
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB, bool second) {
   Place place;
-  place.focal_px = rig_.left.focal_px();
-  place.up_C0 = (R_LB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
-  if (!images.left) return place;
-  orb_.extract(images.left->view(), found_, rig_.left.mask().get());
-  stage_->improve(images.left->width(), images.left->height(), found_);
+  place.focal_px = rig_.left().focal_px();
+  place.up_C0 = (R_LB * rig_.T_BC0().R()).transpose() * Vec3::UnitZ();
+  if (!images.left()) return place;
+  orb_.extract(images.left()->view(), found_, rig_.left().mask().get());
+  stage_->improve(images.left()->width(), images.left()->height(), found_);
   const bool by_depth_image = has_depth_image(images);
   const auto depth_of = [&](const Vec2& px, const Vec2& normalised) -> std::optional<MeasuredInverseDepth> {
     if (by_depth_image) return depth_->at(*images.depth, px);
@@ -124,7 +124,7 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB, bool 
   };
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Keypoint& keypoint = found_.keypoints[i];
-    const auto xy = rig_.left.undistort(keypoint.pixel);
+    const auto xy = rig_.left().undistort(keypoint.pixel);
     if (!xy) continue;
     PlaceFeature feature;
     feature.x = static_cast<float>(xy->x());

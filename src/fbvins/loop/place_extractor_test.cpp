@@ -22,8 +22,8 @@ std::shared_ptr<const Image> wall(double shift_px) {
 
 StereoFrame before_the_wall() {
   StereoFrame frame;
-  frame.left = wall(0);
-  frame.right = wall(test_room::kFocal * test_room::kBaseline / kDepth_m);
+  frame.set_image(0, wall(0));
+  frame.set_image(1, wall(test_room::kFocal * test_room::kBaseline / kDepth_m));
   return frame;
 }
 
@@ -50,12 +50,12 @@ TEST(PlaceExtractor, FindsTheDepthOfAWall) {
 TEST(PlaceExtractor, TakesTheVerticalFromTheAttitude) {
   const Quat R_LB = so3_exp(Vec3(0.3, -0.2, 1.0));
   const Place place = extractor().extract({}, R_LB.toRotationMatrix());
-  EXPECT_LT((R_LB * (test_room::rig().T_BC0.q * place.up_C0) - Vec3::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((R_LB * (test_room::rig().T_BC0().q * place.up_C0) - Vec3::UnitZ()).norm(), 1e-12);
 }
 
 TEST(PlaceExtractor, WithoutTheRightImageThereIsNoDepthWithoutTheLeftOneNothing) {
   StereoFrame frame = before_the_wall();
-  frame.right = nullptr;
+  frame.set_image(1, nullptr);
   const Place place = extractor().extract(frame, Mat3::Identity());
   EXPECT_GT(place.size(), 100u);
   EXPECT_TRUE(std::none_of(place.features.begin(), place.features.end(), [](const PlaceFeature& f) { return f.has_depth(); }));
@@ -67,8 +67,8 @@ TEST(PlaceExtractor, CamerasWithoutACommonTriggerHaveTheBaselineOfTheirExposures
   Keyframe keyframe;
   keyframe.t = Time{1'000'000'000};
   keyframe.v_WB = Vec3(0, 2, 0);
-  keyframe.images.left = wall(0);
-  keyframe.images.right = wall(test_room::kFocal * (test_room::kBaseline + 0.05) / kDepth_m);
+  keyframe.images.set_image(0, wall(0));
+  keyframe.images.set_image(1, wall(test_room::kFocal * (test_room::kBaseline + 0.05) / kDepth_m));
   keyframe.images.offsets.set(1, Duration{-25'000'000});
   const auto with_depth = [&] {
     int right = 0, wrong = 0;
@@ -92,7 +92,7 @@ TEST(PlaceExtractor, TakesDepthsFromTheDepthImage) {
   const StereoRig rig = with_depth(test_room::rig(), {.noise_at_1m_m = 0.004});
   PlaceExtractor extractor(rig, {.max_features = 200}, test_room::vocabulary());
   StereoFrame frame;
-  frame.left = wall(0);
+  frame.set_image(0, wall(0));
   auto depth = std::make_shared<DepthImage>(DepthImage{752, 480, std::vector<std::uint16_t>(752 * 480, 3000)});
   std::fill_n(depth->mm.begin(), 752 * 240, std::uint16_t{0});  // of the lower half alone
   frame.depth = depth;
@@ -115,17 +115,17 @@ TEST(PlaceExtractor, APlaceHasNoFeatureInTheMask) {
   Image left(752, 480, 255), right(752, 480, 255);
   hide(left, MaskRectangle{0, 300, 752, 180});
   hide(right, MaskRectangle{300, 0, 100, 480});
-  rig.left.set_mask(std::make_shared<const Mask>(left));
-  rig.right.set_mask(std::make_shared<const Mask>(right));
+  rig.cameras[0].camera.set_mask(std::make_shared<const Mask>(left));
+  rig.cameras[1].camera.set_mask(std::make_shared<const Mask>(right));
   const Place place =
       PlaceExtractor(rig, {.max_features = 200}, test_room::vocabulary()).extract(before_the_wall(), Mat3::Identity());
   ASSERT_GT(place.size(), 100u);
   const double disparity_px = test_room::kFocal * test_room::kBaseline / kDepth_m;
   for (const PlaceFeature& feature : place.features) {
-    const Vec2 px = rig.left.distort(Vec2(feature.x, feature.y));
-    EXPECT_FALSE(rig.left.hidden(px, kPatchBorder_px));
+    const Vec2 px = rig.left().distort(Vec2(feature.x, feature.y));
+    EXPECT_FALSE(rig.left().hidden(px, kPatchBorder_px));
     const bool on_wall = feature.has_depth() && std::abs(feature.inverse_depth - 1 / kDepth_m) < 0.01;
-    EXPECT_FALSE(on_wall && rig.right.hidden(px - Vec2(disparity_px, 0), kPatchBorder_px - 1));
+    EXPECT_FALSE(on_wall && rig.right().hidden(px - Vec2(disparity_px, 0), kPatchBorder_px - 1));
   }
 }
 

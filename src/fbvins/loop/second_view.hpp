@@ -3,9 +3,9 @@
 // moments before. Each feature is searched along its epipolar curve and refined by Lucas-Kanade, which is cheaper and finer than
 // to match the features of two images. Buffers are reused; one instance, one thread.
 //
-//   SecondViewDepths depths(rig.left.focal_px());
-//   depths.set(frame.left->view(), frame.right->view(), {&rig.right, T_C1C0.R(), T_C1C0.p});
-//   if (auto depth = depths.at(px, *rig.left.undistort(px))) use(depth->value, depth->sigma);
+//   SecondViewDepths depths(rig.left().focal_px());
+//   depths.set(frame.left()->view(), frame.right()->view(), {&rig.right(), T_C1C0.R(), T_C1C0.p});
+//   if (auto depth = depths.at(px, *rig.left().undistort(px))) use(depth->value, depth->sigma);
 #pragma once
 
 #include <optional>

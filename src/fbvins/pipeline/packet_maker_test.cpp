@@ -17,7 +17,7 @@ ImuSample reading(std::int64_t ms) {
   return sample;
 }
 
-StereoFrame image(std::int64_t ms) { return {Time{ms * kMs}, nullptr, nullptr}; }
+StereoFrame image(std::int64_t ms) { return {Time{ms * kMs}}; }
 
 std::vector<SensorPacket> drain(PacketMaker& maker, bool flush = false) {
   std::vector<SensorPacket> packets;

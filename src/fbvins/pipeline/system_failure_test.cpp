@@ -125,7 +125,7 @@ TEST_P(Modes, FinishFlushesAndMayBeCalledTwice) {
   int frames = 0;
   system.on_odometry([&](const Odometry&) { ++frames; });
   const Wall wall;
-  const auto image = [&](int k) { return StereoFrame{Time{50 * kMs * k}, wall.seen_from(0), wall.seen_from(kBaseline)}; };
+  const auto image = [&](int k) { return StereoFrame{Time{50 * kMs * k}, {wall.seen_from(0), wall.seen_from(kBaseline)}}; };
   for (int k = 0; k < 4; ++k) ASSERT_TRUE(system.push(image(k)));
   EXPECT_TRUE(system.finish().ok());
   EXPECT_EQ(frames, 4);  // no reading ever came

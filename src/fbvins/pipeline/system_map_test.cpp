@@ -142,8 +142,8 @@ Flown fly_in(PlaceMap map, int cameras) {
   int frames = 0;
   for (SensorEvent event : sway(150)) {
     if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr) {
-      if ((cameras & kLeft) == 0 && ++frames > kFramesUntilLeftDies) frame->left.reset();
-      if ((cameras & kRight) == 0) frame->right.reset();
+      if ((cameras & kLeft) == 0 && ++frames > kFramesUntilLeftDies) frame->set_image(0, nullptr);
+      if ((cameras & kRight) == 0) frame->set_image(1, nullptr);
     }
     EXPECT_TRUE(system.push(std::move(event)));
   }
@@ -213,7 +213,7 @@ TEST(TimeOffset, AKnownOffsetOfOneCameraChangesNothing) {
   const std::vector<SensorEvent> events = sway(60);
   const auto fly_at = [&](Duration late) {
     StereoRig rig = small_rig();
-    rig.right.set_own_times({.time_offset_s = -late.seconds()});
+    rig.cameras[1].camera.set_own_times({.time_offset_s = -late.seconds()});
     System system = *System::create({}, rig, RunMode::deterministic);
     std::string bytes;
     system.on_odometry([&](const Odometry& o) { bytes += bytes_of(o); });

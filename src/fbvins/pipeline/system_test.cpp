@@ -113,7 +113,7 @@ double error_without(bool left, double back_s, const std::string& frontend) {
   for (SensorEvent event : all) {
     if (auto* frame = std::get_if<StereoFrame>(&event);
         frame && (frame->t - Time{}).seconds() >= 2.5 && (frame->t - Time{}).seconds() < back_s)
-      (left ? frame->left : frame->right).reset();
+      frame->set_image(left ? 0 : 1, nullptr);
     EXPECT_TRUE(system.push(std::move(event)));
   }
   EXPECT_TRUE(system.finish().ok());
@@ -140,7 +140,7 @@ TEST(SystemInput, AnImageOfAnotherSizeCountsAsMissing) {
   for (int k = 0; k <= 400; ++k) {
     ASSERT_TRUE(system.push(ImuSample{Time{k * kMs}, Vec3::Zero(), Vec3(0, -9.81, 0)}));
     if (k != 100 && k != 150 && k != 200) continue;
-    ASSERT_TRUE(system.push(StereoFrame{Time{k * kMs}, k == 150 ? good : other, k == 100 ? good : other}));
+    ASSERT_TRUE(system.push(StereoFrame{Time{k * kMs}, {k == 150 ? good : other, k == 100 ? good : other}}));
   }
   ASSERT_TRUE(system.finish().ok());
   using enum HealthReason;

@@ -40,9 +40,9 @@ TEST(RealsenseDepth, DepthImagesComeWithTheLeftOnes) {
   ASSERT_EQ(got.frames.size(), 10u);
   for (std::size_t i = 0; i < 10; ++i) {
     const StereoFrame& frame = got.frames[i];
-    ASSERT_TRUE(frame.left && frame.depth) << i;
-    EXPECT_FALSE(frame.right);
-    EXPECT_EQ(frame.left->at(5, 5), i);
+    ASSERT_TRUE(frame.left() && frame.depth) << i;
+    EXPECT_FALSE(frame.right());
+    EXPECT_EQ(frame.left()->at(5, 5), i);
     EXPECT_EQ(frame.depth->row(479)[638], 2000 + i);
     EXPECT_EQ(frame.depth->row(479)[639], 0);
   }
@@ -50,9 +50,9 @@ TEST(RealsenseDepth, DepthImagesComeWithTheLeftOnes) {
 
 TEST(RealsenseDepth, ADepthStreamThatLiesElsewhereHasItsOwnLensAndPose) {
   StereoRig apart = with_depth(with_one_camera(rig()), {});
-  apart.right = rig().right;  // the device's, which is not used
+  apart.cameras.push_back(rig().mounted(1));  // the device's, which is not used
   const Pose<C0, C0> T_CD(so3_exp(Vec3(0.01, -0.02, 0.03)), Vec3(0.015, 0.001, -0.002));
-  apart.depth->own = MountedCamera{Camera(PinholeRadtan{425, 425, 424, 240, 0, 0, 0, 0}, 848, 480), apart.T_BC0 * T_CD};
+  apart.depth->own = MountedCamera{Camera(PinholeRadtan{425, 425, 424, 240, 0, 0, 0, 0}, 848, 480), apart.T_BC0() * T_CD};
   SoftwareCamera device(apart);
   const auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {}, {.depth = true});
   ASSERT_TRUE(camera) << camera.error().message;

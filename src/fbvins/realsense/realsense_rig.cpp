@@ -66,15 +66,13 @@ Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2
   if (!left_camera) return left_camera.error();
   const auto second_camera = camera_of(second.get_intrinsics(), depth ? "depth" : "right infrared");
   if (!second_camera) return second_camera.error();
-  rig.left = *left_camera;
-  rig.T_BC0 = pose_of<B, C0>(left.get_extrinsics_to(gyro));
+  rig.cameras = {{*left_camera, pose_of<B, C0>(left.get_extrinsics_to(gyro))}};
   if (depth) {
     rig = with_depth(rig, depth_sensor(*second_camera, baseline_m));
     const Pose<C0, C0> T_CD = pose_of<C0, C0>(second.get_extrinsics_to(left));
-    if (!registered(*left_camera, *second_camera, T_CD)) rig.depth->own = MountedCamera{*second_camera, rig.T_BC0 * T_CD};
+    if (!registered(*left_camera, *second_camera, T_CD)) rig.depth->own = MountedCamera{*second_camera, rig.T_BC0() * T_CD};
   } else {
-    rig.right = *second_camera;
-    rig.T_BC1 = pose_of<B, C1>(second.get_extrinsics_to(gyro));
+    rig.cameras.push_back({*second_camera, pose_of<B, C0>(second.get_extrinsics_to(gyro))});
   }
   rig.imu_noise.gyro_noise_density_radps_rthz = kGyroNoise_radps_rthz;
   rig.imu_noise.accel_noise_density_mps2_rthz = kAccelNoise_mps2_rthz;

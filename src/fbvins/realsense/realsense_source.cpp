@@ -22,7 +22,7 @@ constexpr Duration kStall{2'000'000'000}, kTwiceInARow{10'000'000'000};
 bool is_recording(const std::string& which) { return which.ends_with(".bag"); }
 
 bool fits(const StereoRig& rig, const RealsenseCamera& camera) {
-  return rig.left.width() == camera.width_px() && rig.left.height() == camera.height_px();
+  return rig.left().width() == camera.width_px() && rig.left().height() == camera.height_px();
 }
 
 }  // namespace
@@ -145,13 +145,13 @@ Result<void> RealsenseSource::set_rig() {
     const Result<StereoRig>& device = camera_->rig();
     if (!device) return device.error();
     DepthSensor sensor = *device->depth;
-    if (sensor.own) sensor.own->T_BC = rig_.T_BC0 * (device->T_BC0.inverse() * sensor.own->T_BC);
+    if (sensor.own) sensor.own->T_BC = rig_.T_BC0() * (device->T_BC0().inverse() * sensor.own->T_BC);
     rig_ = with_depth(rig_, sensor);
   }
   if (fits(rig_, *camera_)) return {};
   return Error{ErrorCode::invalid_argument, fmt::format("{} is of {} x {} pixels, the camera delivers {} x {}",
-                                                        own ? "its calibration" : files.kalibr_camchain, rig_.left.width(),
-                                                        rig_.left.height(), camera_->width_px(), camera_->height_px())};
+                                                        own ? "its calibration" : files.kalibr_camchain, rig_.left().width(),
+                                                        rig_.left().height(), camera_->width_px(), camera_->height_px())};
 }
 
 void RealsenseSource::wait(double longest_s) {

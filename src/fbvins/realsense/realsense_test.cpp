@@ -69,10 +69,10 @@ TEST(Realsense, TakesTheDevicesCalibration) {
   ASSERT_TRUE(camera) << camera.error().message;
   ASSERT_TRUE((*camera)->rig()) << (*camera)->rig().error().message;
   const StereoRig &seen = *(*camera)->rig(), wanted = rig();
-  EXPECT_EQ(seen.left.width(), 640);
-  EXPECT_NEAR(std::get<PinholeRadtan>(seen.left.model()).cx, 320.5, 1e-9);
-  EXPECT_LT((seen.T_BC0.p - wanted.T_BC0.p).norm(), 1e-8);
-  EXPECT_LT((seen.T_BC1.p - wanted.T_BC1.p).norm(), 1e-8);
+  EXPECT_EQ(seen.left().width(), 640);
+  EXPECT_NEAR(std::get<PinholeRadtan>(seen.left().model()).cx, 320.5, 1e-9);
+  EXPECT_LT((seen.T_BC0().p - wanted.T_BC0().p).norm(), 1e-8);
+  EXPECT_LT((seen.T_BC1().p - wanted.T_BC1().p).norm(), 1e-8);
   EXPECT_EQ(seen.image_rate_hz, 30);
   EXPECT_EQ(seen.imu_noise.rate_hz, 200);
   EXPECT_EQ(device.emitter(), 0) << "the emitter is off";
@@ -80,20 +80,20 @@ TEST(Realsense, TakesTheDevicesCalibration) {
 
 TEST(Realsense, RotationsAreColumnByColumn) {
   StereoRig turned = rig();
-  turned.T_BC0.q = so3_exp(Vec3(0.3, -0.2, 0.9));
+  turned.cameras[0].T_BC.q = so3_exp(Vec3(0.3, -0.2, 0.9));
   SoftwareCamera device(turned);
   auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
   ASSERT_TRUE(camera) << camera.error().message;
-  EXPECT_LT((*camera)->rig()->T_BC0.q.angularDistance(turned.T_BC0.q), 1e-6);
+  EXPECT_LT((*camera)->rig()->T_BC0().q.angularDistance(turned.T_BC0().q), 1e-6);
 }
 
 TEST(Realsense, TakesBrownsModelAndRefusesACameraWithoutStereo) {
   StereoRig bent = rig();
-  bent.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, -0.3, 0.1, 0, 0}, 640, 480);
+  bent.cameras[0].camera = Camera(PinholeRadtan{380, 381, 320.5, 239.5, -0.3, 0.1, 0, 0}, 640, 480);
   SoftwareCamera device(bent);
   auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
   ASSERT_TRUE(camera) << "Brown's model is supported: " << camera.error().message;
-  EXPECT_NEAR(std::get<PinholeRadtan>((*camera)->rig()->left.model()).k1, -0.3, 1e-7);
+  EXPECT_NEAR(std::get<PinholeRadtan>((*camera)->rig()->left().model()).k1, -0.3, 1e-7);
   rs2::software_device blind;
   auto sensor = blind.add_sensor("Motion Module");
   sensor.add_motion_stream({RS2_STREAM_GYRO, 0, 1, 200, RS2_FORMAT_MOTION_XYZ32F, {}});
@@ -114,10 +114,10 @@ TEST(Realsense, StreamsBecomePairsAndOneImu) {
   EXPECT_EQ(got.frames.size(), 10u);
   for (std::size_t i = 0; i < got.frames.size(); ++i) {
     const StereoFrame& frame = got.frames[i];
-    ASSERT_TRUE(frame.left && frame.right);
+    ASSERT_TRUE(frame.left() && frame.right());
     EXPECT_EQ((frame.t - kStart).ns, static_cast<std::int64_t>(i) * 33 * kMs);
-    EXPECT_EQ(frame.left->at(639, 479), 2 * i);
-    EXPECT_EQ(frame.right->at(0, 0), 2 * i + 1);
+    EXPECT_EQ(frame.left()->at(639, 479), 2 * i);
+    EXPECT_EQ(frame.right()->at(0, 0), 2 * i + 1);
   }
   ASSERT_GT(got.readings.size(), 60u);
   for (const ImuSample& sample : got.readings) {
@@ -235,7 +235,7 @@ TEST(Realsense, PlaysARecordingToItsEnd) {
   const KalibrFiles files(rig());
   auto source = RealsenseSource::open(path, calibrated_by(files));
   ASSERT_TRUE(source) << source.error().message;
-  EXPECT_LT(((*source)->rig().T_BC1.p - rig().T_BC1.p).norm(), 1e-6);
+  EXPECT_LT(((*source)->rig().T_BC1().p - rig().T_BC1().p).norm(), 1e-6);
   CollectedInput got;
   ASSERT_TRUE((*source)->run(got));
   EXPECT_GE(got.frames.size(), 28u);
@@ -259,13 +259,13 @@ TEST(Realsense, JoinsImagesByTheCamerasOwnTimeOffsets) {
   };
   std::string said;
   const auto frames = played(with_times(rig(), {{}, {.time_offset_s = -kLate.seconds()}}), said);
-  EXPECT_GE(std::count_if(frames.begin(), frames.end(), [](const StereoFrame& f) { return f.left && f.right; }), 6);
+  EXPECT_GE(std::count_if(frames.begin(), frames.end(), [](const StereoFrame& f) { return f.left() && f.right(); }), 6);
   for (const StereoFrame& frame : frames)
-    if (frame.left && frame.right) {
+    if (frame.left() && frame.right()) {
       EXPECT_EQ(frame.offsets, ExposureOffsets({{}, kLate}));
     }
   said.clear();
-  for (const StereoFrame& frame : played(rig(), said)) EXPECT_FALSE(frame.left && frame.right) << "12 ms are no pair";
+  for (const StereoFrame& frame : played(rig(), said)) EXPECT_FALSE(frame.left() && frame.right()) << "12 ms are no pair";
   EXPECT_NE(said.find("without partner within 3 ms"), std::string::npos) << said;
   std::filesystem::remove(path);
 }
@@ -341,8 +341,8 @@ TEST(Realsense, FliesARecordedFlight) {
         device.accel(t, sample->accel_mps2);
       } else {
         const auto& frame = std::get<StereoFrame>(*event);
-        device.image(0, t, *frame.left);
-        device.image(1, t, *frame.right);
+        device.image(0, t, *frame.left());
+        device.image(1, t, *frame.right());
       }
     }
     (*camera)->stop();

@@ -25,7 +25,7 @@ std::unique_ptr<Ros2ImageSink> sink_with(const Ros2Options& options = {}) {
 
 StereoFrame frame_at(Time t) {
   const auto image = [](std::uint8_t grey) { return std::make_shared<const Image>(8, 6, grey); };
-  return {t, image(1), image(2)};
+  return {t, {image(1), image(2)}};
 }
 
 TEST(Ros2ImageSink, PublishesWhatSomebodyListensTo) {
@@ -43,7 +43,7 @@ TEST(Ros2ImageSink, PublishesWhatSomebodyListensTo) {
     frame.offsets.set(1, Duration{7});
     ASSERT_TRUE(sink->take(LiveEvent(frame)));
     ASSERT_TRUE(right.wait_for(1) && info.wait_for(1));
-    frame.right = nullptr;
+    frame.set_image(1, nullptr);
     ASSERT_TRUE(sink->take(LiveEvent(frame))) << "without the right image";
     ASSERT_TRUE(info.wait_for(2));
   }
@@ -55,7 +55,7 @@ TEST(Ros2ImageSink, PublishesWhatSomebodyListensTo) {
   EXPECT_EQ(image->t, Time{1'000'000'007}) << "when this camera saw it";
   EXPECT_EQ(image->pixels, std::string(48, '\2'));
   std::string expected;
-  append_camera_info(expected, Time{1'000'000'000}, "camera0_optical", test::socket_test_rig().left);
+  append_camera_info(expected, Time{1'000'000'000}, "camera0_optical", test::socket_test_rig().left());
   EXPECT_EQ(info.messages()[0], expected);
 }
 

@@ -149,8 +149,8 @@ TEST(Ros2Sink, FixedTransformsAreTheMountingAndTheCameras) {
   ASSERT_TRUE(Ros2Sink::create(node(), rig, options));
   std::string expected;
   append_transforms(expected, Time{},
-                    std::array{RosTransform{"imu_link", "camera0_optical", rig.T_BC0.q, rig.T_BC0.p},
-                               RosTransform{"imu_link", "camera1_optical", rig.T_BC1.q, rig.T_BC1.p}});
+                    std::array{RosTransform{"imu_link", "camera0_optical", rig.T_BC0().q, rig.T_BC0().p},
+                               RosTransform{"imu_link", "camera1_optical", rig.T_BC1().q, rig.T_BC1().p}});
   ASSERT_TRUE(fixed.wait_for(1));
   EXPECT_EQ(fixed.messages().back(), expected);
   ASSERT_TRUE(Ros2Sink::create(node(), rig));

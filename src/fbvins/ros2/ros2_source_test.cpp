@@ -97,7 +97,7 @@ TEST(Ros2Source, TopicsAreThoseOfTheCalibration) {
   ASSERT_TRUE(elsewhere) << elsewhere.error().message;
   EXPECT_EQ((*elsewhere)->rig().camera_count(), 1);
   ASSERT_TRUE((*elsewhere)->rig().depth->own) << "the second camera is the depth sensor's";
-  EXPECT_GT(((*elsewhere)->rig().depth->own->T_BC.p - (*elsewhere)->rig().T_BC0.p).norm(), 0.01);
+  EXPECT_GT(((*elsewhere)->rig().depth->own->T_BC.p - (*elsewhere)->rig().T_BC0().p).norm(), 0.01);
   const CameraFile three(3);
   EXPECT_FALSE(Ros2Source::open(node(), *parse_ros2_topics("/a,/imu,depth=/d"), three.options()));
 }
@@ -130,7 +130,9 @@ TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
     EXPECT_TRUE(to.publish(std::move(message)));
   };
   // Publishers are found within moments, one after the other; messages sent before are lost, and a pair may lack an image.
-  const auto pair = [&] { return std::ranges::find_if(notes.frames, [](const StereoFrame& f) { return f.left && f.right; }); };
+  const auto pair = [&] {
+    return std::ranges::find_if(notes.frames, [](const StereoFrame& f) { return f.left() && f.right(); });
+  };
   const auto both_came = [&] {
     const std::lock_guard lock(notes.mutex);
     return pair() != notes.frames.end() && !notes.readings.empty();
@@ -149,7 +151,7 @@ TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
   (*source)->stop();
   runs.join();
   EXPECT_EQ(notes.said.front(), "/src/left: images are 9 x 6, in the calibration they are 8 x 6");
-  for (const auto& image : {pair()->left, pair()->right})
+  for (const auto& image : {pair()->left(), pair()->right()})
     EXPECT_EQ(image->at(3, 2), static_cast<std::uint8_t>(pair()->t.ns / 50'000'000));
   EXPECT_EQ(notes.readings.front().accel_mps2, Vec3(4, 5, 6));
 }
@@ -165,7 +167,7 @@ TEST(Ros2Source, DepthImagesComeWithTheirCamera) {
   ASSERT_TRUE(grey && depth);
   const auto came = [&] {
     const std::lock_guard lock(notes.mutex);
-    return std::ranges::any_of(notes.frames, [](const StereoFrame& f) { return f.left && f.depth; });
+    return std::ranges::any_of(notes.frames, [](const StereoFrame& f) { return f.left() && f.depth; });
   };
   for (int k = 1; !came(); ++k) {
     const Time t{k * 50'000'000LL};
@@ -181,7 +183,7 @@ TEST(Ros2Source, DepthImagesComeWithTheirCamera) {
   }
   (*source)->stop();
   runs.join();
-  const auto both = std::ranges::find_if(notes.frames, [](const StereoFrame& f) { return f.left && f.depth; });
+  const auto both = std::ranges::find_if(notes.frames, [](const StereoFrame& f) { return f.left() && f.depth; });
   EXPECT_EQ(both->depth->row(5)[7], 1000 + both->t.ns / 50'000'000);
 }
 

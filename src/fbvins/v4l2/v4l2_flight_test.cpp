@@ -50,7 +50,7 @@ std::vector<Delivery> deliveries(Dataset& dataset, int images) {
     } else {
       if (images-- == 0) break;
       const auto& frame = std::get<StereoFrame>(*event);
-      all.push_back({frame.t, {}, padded(*frame.left), padded(*frame.right)});
+      all.push_back({frame.t, {}, padded(*frame.left()), padded(*frame.right())});
     }
   }
   return all;

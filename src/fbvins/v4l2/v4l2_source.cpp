@@ -22,7 +22,7 @@ constexpr int kLongestWait_ms = 100;
 /// Images side by side are of one size.
 Result<void> check_sizes(const V4l2Devices& devices, const StereoRig& rig) {
   for (int i = 1; i < rig.camera_count() && devices.cameras.size() == 1; ++i)
-    if (rig.camera(i).width() != rig.left.width() || rig.camera(i).height() != rig.left.height())
+    if (rig.camera(i).width() != rig.left().width() || rig.camera(i).height() != rig.left().height())
       return Error{
           ErrorCode::invalid_argument,
           fmt::format("{}: images side by side have one size, and in the calibration camera {} has another than camera 0",

@@ -32,9 +32,9 @@ TEST(V4l2Source, PutsTwoCamerasTogether) {
   ASSERT_TRUE(got.wait_for_frames(8, kPatience));
   int pairs = 0;
   for (const StereoFrame& frame : got.frames) {
-    if (!frame.left || !frame.right) continue;
+    if (!frame.left() || !frame.right()) continue;
     ++pairs;
-    EXPECT_EQ(frame.right->at(63, 47) - frame.left->at(0, 0), 20);
+    EXPECT_EQ(frame.right()->at(63, 47) - frame.left()->at(0, 0), 20);
   }
   EXPECT_EQ(pairs, 7) << "a damaged image is none";
   EXPECT_TRUE(running.heard("64 x 48 pixels of YUYV"));
@@ -50,13 +50,13 @@ TEST(V4l2Source, CutsOneCameraInTwo) {
     std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(y * 160 + 64), 64, std::uint8_t{2});
   ASSERT_TRUE(deliver(both, Time{5}, bytes));
   ASSERT_TRUE(got.wait_for_frames(1, kPatience));
-  EXPECT_EQ(got.frames[0].left->at(63, 47), 1);
-  EXPECT_EQ(got.frames[0].right->at(0, 0), 2);
+  EXPECT_EQ(got.frames[0].left()->at(63, 47), 1);
+  EXPECT_EQ(got.frames[0].right()->at(0, 0), 2);
 }
 
 StereoRig rig_of_three() {
   StereoRig rig = small_rig();
-  rig.more.push_back({Camera(PinholeRadtan{50, 50, 15.5, 11.5, 0, 0, 0, 0}, 32, 24), {Quat::Identity(), Vec3(0.2, 0, 0)}});
+  rig.cameras.push_back({Camera(PinholeRadtan{50, 50, 15.5, 11.5, 0, 0, 0, 0}, 32, 24), {Quat::Identity(), Vec3(0.2, 0, 0)}});
   return rig;
 }
 
@@ -75,12 +75,12 @@ TEST(V4l2Source, PutsThreeCamerasTogether) {
   ASSERT_TRUE(got.wait_for_frames(3, kPatience));
   ASSERT_TRUE(got.frames[1].image(2));
   EXPECT_EQ(got.frames[1].image(2)->width(), 32);
-  EXPECT_EQ(got.frames[1].image(2)->at(31, 23) - got.frames[1].left->at(0, 0), 40);
+  EXPECT_EQ(got.frames[1].image(2)->at(31, 23) - got.frames[1].left()->at(0, 0), 40);
 }
 
 TEST(V4l2Source, OneDeviceMayHaveOneCameraOrSeveralSideBySide) {
   StereoRig alike = small_rig();
-  alike.more.push_back({alike.left, {Quat::Identity(), Vec3(0.2, 0, 0)}});
+  alike.cameras.push_back({alike.left(), {Quat::Identity(), Vec3(0.2, 0, 0)}});
   for (const StereoRig& rig : {with_one_camera(alike), alike}) {
     const int cameras = rig.camera_count();
     FakeVideo device("/fake/all", {fourcc("GREY")});
@@ -92,7 +92,7 @@ TEST(V4l2Source, OneDeviceMayHaveOneCameraOrSeveralSideBySide) {
     ASSERT_TRUE(deliver(device, Time{5}, bytes));
     ASSERT_TRUE(got.wait_for_frames(1, kPatience));
     EXPECT_EQ(got.frames[0].image(cameras - 1)->at(63, 0), 7);
-    EXPECT_EQ(got.frames[0].right != nullptr, cameras > 1);
+    EXPECT_EQ(got.frames[0].right() != nullptr, cameras > 1);
   }
 }
 
@@ -133,7 +133,7 @@ TEST(V4l2Source, SaysWhatIsWrong) {
   {
     Running running("/fake/narrow,/fake/colours,udp:127.0.0.1:9:0", [] {
       StereoRig rig = small_rig();
-      rig.left = rig.right = Camera(PinholeRadtan{100, 100, 60, 23.5, 0, 0, 0, 0}, 128, 48);
+      for (MountedCamera& mounted : rig.cameras) mounted.camera = Camera(PinholeRadtan{100, 100, 60, 23.5, 0, 0, 0, 0}, 128, 48);
       return rig;
     }());
     CollectedInput got;

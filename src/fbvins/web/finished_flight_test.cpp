@@ -44,9 +44,8 @@ class Record : public testing::Test {
       view.t = at(i);
       view.features = {{TrackId{7}, Vec2(10.5, 20), 3, 4.5}, {TrackId{8}, Vec2(11, 21), 0, 0}};
       view.landmarks = {{TrackId{7}, Vec3(1, 2, 3)}, {TrackId{9}, Vec3(4, 5, 6)}};
-      for (const LiveEvent& event :
-           {LiveEvent(StereoFrame{at(i), std::make_shared<const Image>(64, 48, std::uint8_t(i)), nullptr}), LiveEvent(view),
-            LiveEvent(odometry(i))})
+      for (const LiveEvent& event : {LiveEvent(StereoFrame{at(i), {std::make_shared<const Image>(64, 48, std::uint8_t(i))}}),
+                                     LiveEvent(view), LiveEvent(odometry(i))})
         ASSERT_TRUE((*sink)->take(event));
     }
     LiveStatus status;
@@ -63,7 +62,7 @@ class Record : public testing::Test {
     PinholeRadtan model;
     model.fx = model.fy = 40, model.cx = 32, model.cy = 24;
     StereoRig rig;
-    rig.left = rig.right = Camera(model, 64, 48);
+    rig.cameras.assign(2, {Camera(model, 64, 48), {}});
     return rig;
   }
   template <class Event>
@@ -108,7 +107,7 @@ TEST_F(Record, GivesTheEventsOfTheFlight) {
   EXPECT_EQ(views[5].landmarks[1].p_W, Vec3(4, 5, 6));
   const auto images = all<StereoFrame>(**flight);
   ASSERT_EQ(images.size(), 20u);
-  EXPECT_EQ(images[4].left->row(0)[0], 4);
+  EXPECT_EQ(images[4].left()->row(0)[0], 4);
   const auto statuses = all<LiveStatus>(**flight);
   ASSERT_EQ(statuses.size(), 1u);
   EXPECT_EQ(statuses[0].counts.images_dropped, 3);

@@ -63,7 +63,7 @@ class RecordedFlight final : public FinishedFlight {
     const std::string bytes = bytes_->read(moment.offset, moment.length);
     if (moment.kind == Kind::image) {
       const std::optional<RosImage> image = read_image(bytes);
-      return StereoFrame{moment.t, image ? copied(*image) : nullptr, nullptr};
+      return StereoFrame{moment.t, {image ? copied(*image) : nullptr}};
     }
     if (moment.kind == Kind::view) return read_view(bytes).value_or(LiveView{});
     if (moment.kind == Kind::mark) return read_mark(bytes).value_or(LiveMark{});

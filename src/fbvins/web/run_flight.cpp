@@ -126,7 +126,7 @@ class RunFlight final : public FinishedFlight {
   LiveEvent event(std::size_t i) const override {
     const RunImage& image = images_[i / 4];
     const Odometry& o = image.odometry;
-    if (i % 4 == 0) return StereoFrame{o.t, pixels_at(o.t), nullptr};
+    if (i % 4 == 0) return StereoFrame{o.t, {pixels_at(o.t)}};
     if (i % 4 == 1) return view_of(image);
     if (i % 4 == 2) return o;
     LiveStatus status;
@@ -194,7 +194,7 @@ class RunFlight final : public FinishedFlight {
     const auto& frames = recording_->frames;
     const auto frame =
         std::lower_bound(frames.begin(), frames.end(), t, [](const FrameEntry& f, Time when) { return f.t < when; });
-    return frame != frames.end() && frame->t == t ? recording_->loader->load(*frame).frame.left : nullptr;
+    return frame != frames.end() && frame->t == t ? recording_->loader->load(*frame).frame.left() : nullptr;
   }
 
   std::vector<RunImage> images_;

@@ -116,9 +116,9 @@ Result<void> WebSink::take(const LiveEvent& event) {
 
 /// Encoded at once rather than kept, as its memory may be the sensor's. It waits for its odometry; until then no other is taken.
 void WebSink::show(const StereoFrame& frame) {
-  if (!frame.left && frame.more.empty()) return;
+  if (!frame.left() && frame.images.size() <= 2) return;
   if (!pictures_.empty() || viewers() == 0 || !due(picture_due_, kPicturePeriod)) return;
-  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i)
+  for (int i = 0; i < static_cast<int>(frame.images.size()); ++i)
     if (const std::shared_ptr<const Image> image = frame.image(i))
       pictures_.push_back({i, frame.t, encoder_.encode(*image), image->width(), image->height()});
 }

@@ -38,7 +38,7 @@ LiveView view(int image) {
   return v;
 }
 
-StereoFrame frame(int image) { return {at(image), std::make_shared<const Image>(64, 48, std::uint8_t(100)), nullptr}; }
+StereoFrame frame(int image) { return {at(image), {std::make_shared<const Image>(64, 48, std::uint8_t(100))}}; }
 
 class Page : public testing::Test {
  protected:
@@ -111,8 +111,7 @@ TEST_F(Page, ShowsEachCameraOfARigWithItsOwnFeatures) {
   peer.watch();
   next(peer, "hello");
   StereoFrame four = frame(3);
-  four.right = four.left;
-  four.more = {nullptr, four.left};
+  four.images = {four.left(), four.left(), nullptr, four.left()};
   ASSERT_TRUE(sink->take(four));
   LiveView seen = view(3);
   seen.features.push_back({TrackId{8}, Vec2(5, 6), 77, 2, 3});
@@ -135,7 +134,7 @@ TEST_F(Page, ShowsTheRightCameraOfAPairWithItsFeatures) {
   peer.watch();
   next(peer, "hello");
   StereoFrame pair = frame(3);
-  pair.right = pair.left;
+  pair.set_image(1, pair.left());
   ASSERT_TRUE(sink->take(pair));
   LiveView seen = view(3);
   for (const double u : {5., 6.}) seen.right_features.push_back({TrackId{8}, Vec2(u, 6), 77, 2, 1});

@@ -14,10 +14,9 @@ class DotFrontend final : public fbvins::Frontend {
 
   fbvins::TrackedFrame process(const fbvins::SensorPacket& packet, const fbvins::StatePrior&) override {
     fbvins::TrackedFrame out;
-    out.has_left = packet.frame.left != nullptr;
-    out.has_right = packet.frame.right != nullptr;
-    if (!out.has_left || !out.has_right) return out;
-    const auto left = dots_in(*packet.frame.left, rig_.left), right = dots_in(*packet.frame.right, rig_.right);
+    out.cameras = {packet.frame.left() != nullptr, packet.frame.right() != nullptr};
+    if (!out.has(0) || !out.has(1)) return out;
+    const auto left = dots_in(*packet.frame.left(), rig_.left()), right = dots_in(*packet.frame.right(), rig_.right());
     for (int dot = 0; dot < wall::kDots; ++dot) {
       const auto k = static_cast<std::size_t>(dot);
       if (!left[k]) continue;
