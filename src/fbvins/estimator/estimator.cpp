@@ -77,7 +77,10 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   odometry.time_offset_s = time_alignment_.correction().seconds();
   odometry.time_offset_sigma_s = time_alignment_.sigma_s();
   const bool is_public = running_ && !trial_;
-  if (is_public) publish(odometry);
+  if (is_public) {
+    waiting_since_.reset();
+    publish(odometry);
+  }
   odometry.reset_counter = reset_counter_;
   if (is_public) carried_.remember(window_, odometry, reading_noise_.clipped());
   if (odometry.health.state == HealthState::lost) restart();

@@ -118,6 +118,7 @@ class Estimator {
   WindowSolver solver_;
   WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused
   bool running_ = false;
+  std::optional<Time> waiting_since_;  ///< for the first pose, or the first one after a loss
   std::optional<StartTrial> trial_;  ///< one camera: the window goes on, and nothing of it is published yet
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;

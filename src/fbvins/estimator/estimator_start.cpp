@@ -23,10 +23,10 @@ constexpr double kMaxBiasSigmasAtStart = 2.8;
 constexpr double kBiasRefused_s = 1;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
-/// A start with one camera is published when it would have been good for so long and its velocity is so certain, of three axes
-/// together: two seconds of it are the largest correction that a good pose may owe. In any case after kLongestTrial_s.
-/// Source: docs/experiments/sensors.md#starts-of-one-camera.
-constexpr double kGoodOnTrial_s = 0.3, kVelocityOnTrial_mps = 0.05, kLongestTrial_s = 4;
+/// A start with one camera is published when it would have been good for so long, for less once a pose has been waited for long,
+/// and its velocity is so certain, of three axes together: two seconds of it are the largest correction that a good pose may owe.
+/// In any case after kLongestTrial_s. Source: docs/experiments/sensors.md#starts-of-one-camera.
+constexpr double kGoodOnTrial_s = 1.2, kGoodAtLeast_s = 0.3, kWaitedLong_s = 5, kVelocityOnTrial_mps = 0.05, kLongestTrial_s = 4;
 
 void keep_only_stats(Odometry& out) {
   const EstimatorStats stats = out.stats;
@@ -38,6 +38,7 @@ void keep_only_stats(Odometry& out) {
 
 void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& out) {
   CpuTimer timer;
+  if (!waiting_since_) waiting_since_ = frame.t;
   TrackedFrame weighted = frame;
   weighted.imu.noise = reading_noise_.of(frame.imu);
   const std::optional<InitialSolution> start = initialiser_.process(weighted, rest, calibration_, restart_pose_);
@@ -93,7 +94,7 @@ void Estimator::refuse_start(Odometry& out) {
 /// as a contradiction or a large correction soon after.
 void Estimator::stay_on_trial(const TrackedFrame& frame, Estimate& out) {
   Odometry& odometry = out.odometry;
-  if (odometry.health.state == HealthState::lost) {
+  if (odometry.health.state == HealthState::lost || odometry.health.reason == HealthReason::contradiction) {
     trial_.reset();
     refuse_start(odometry);
     initialiser_.reset();
@@ -109,7 +110,8 @@ void Estimator::stay_on_trial(const TrackedFrame& frame, Estimate& out) {
     published_.restart();
   }
   const bool certain = std::sqrt(odometry.velocity_covariance.trace()) < kVelocityOnTrial_mps;  // (O9)
-  const bool passed = certain && (frame.t - trial_->good_since).seconds() >= kGoodOnTrial_s;
+  const double enough_s = (frame.t - *waiting_since_).seconds() > kWaitedLong_s ? kGoodAtLeast_s : kGoodOnTrial_s;
+  const bool passed = certain && (frame.t - trial_->good_since).seconds() >= enough_s;
   if (passed || (frame.t - trial_->since).seconds() > kLongestTrial_s) {
     trial_.reset();
     published_.restart();
