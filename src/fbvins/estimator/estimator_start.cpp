@@ -94,7 +94,8 @@ void Estimator::refuse_start(Odometry& out) {
 /// as a contradiction or a large correction soon after.
 void Estimator::stay_on_trial(const TrackedFrame& frame, Estimate& out) {
   Odometry& odometry = out.odometry;
-  if (odometry.health.state == HealthState::lost || odometry.health.reason == HealthReason::contradiction) {
+  const bool waited_long = (frame.t - *waiting_since_).seconds() > kWaitedLong_s;
+  if (odometry.health.state == HealthState::lost || (!waited_long && odometry.health.reason == HealthReason::contradiction)) {
     trial_.reset();
     refuse_start(odometry);
     initialiser_.reset();
@@ -110,8 +111,8 @@ void Estimator::stay_on_trial(const TrackedFrame& frame, Estimate& out) {
     published_.restart();
   }
   const bool certain = std::sqrt(odometry.velocity_covariance.trace()) < kVelocityOnTrial_mps;  // (O9)
-  const double enough_s = (frame.t - *waiting_since_).seconds() > kWaitedLong_s ? kGoodAtLeast_s : kGoodOnTrial_s;
-  const bool passed = certain && (frame.t - trial_->good_since).seconds() >= enough_s;
+  const double good_s = (frame.t - trial_->good_since).seconds();
+  const bool passed = certain && good_s >= (waited_long ? kGoodAtLeast_s : kGoodOnTrial_s);
   if (passed || (frame.t - trial_->since).seconds() > kLongestTrial_s) {
     trial_.reset();
     published_.restart();
