@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -88,10 +89,11 @@ int run(const Arguments& arguments) {
     return fail(written.error().message);
   if (flight->map && !flight->map->not_saved.empty()) return fail(flight->map->not_saved);
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));
-  if (summary.coverage.with_pose > 0) return kOk;
-  warn(fmt::format("{}; `{}` examines the recording", no_pose_sentence({summary.health.begin(), summary.health.end()}),
-                   doctor_command(arguments.recording)));
-  return kEstimationFailed;
+  const bool has_poses = summary.coverage.with_pose > 0;
+  const std::map<std::string, int> health(summary.health.begin(), summary.health.end());
+  if (const std::string trouble = has_poses ? few_good_sentence(health) : no_pose_sentence(health); !trouble.empty())
+    warn(fmt::format("{}; `{}` examines the recording", trouble, doctor_command(arguments.recording)));
+  return has_poses ? kOk : kEstimationFailed;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <cmath>
 #include <filesystem>
 #include <map>
 
@@ -171,6 +172,7 @@ RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Tr
   for (const StampedPose<W>& pose : record.poses()) poses.push_back(pose.t);
   s.coverage = coverage_of(std::move(images), std::move(poses));
   count_health(record, s);
+  s.time_offset_found_s = time_offset_found_s(record);
   if (!truth.empty()) evaluate_against(truth, record, s);
   else s.no_evaluation = "the recording holds no ground truth";
   for (const TrackedRecord& tracked : record.tracked) {
@@ -241,6 +243,9 @@ std::string to_text(const RunSummary& s) {
   for (const auto& [name, frames] : s.health) text += fmt::format(" {} {}", name, frames);
   for (const auto& [camera, frames] : s.without_cameras) text += fmt::format(", {} without camera {}", frames, camera);
   text += s.images_bad > 0 ? fmt::format("\n{} image files could not be used\n", s.images_bad) : "\n";
+  if (std::abs(s.time_offset_found_s) > 0.5e-3)
+    text += fmt::format("time offset: {:+.1f} ms more than the calibration's, found in flight{}\n", 1e3 * s.time_offset_found_s,
+                        s.evaluation ? " and applied to the ground truth" : "");
   text += s.evaluation ? to_table(*s.evaluation, Alignment::se3) : fmt::format("no accuracy: {}\n", s.no_evaluation);
   if (s.nees && s.nees->count > 0)
     text += fmt::format(

@@ -55,6 +55,13 @@ TEST(RunSummary, CountsRestartsOnlyAfterTheFirstPose) {
   EXPECT_EQ(s.no_evaluation, "the recording holds no ground truth");
 }
 
+TEST(RunSummary, ATimeOffsetThatWasFoundIsSaid) {
+  RunRecord record = circle(10);
+  EXPECT_EQ(to_text(summarise(record, images(10), {})).find("time offset"), std::string::npos);
+  record.odometry.back().time_offset_s = 0.079;
+  EXPECT_NE(to_text(summarise(record, images(10), {})).find("time offset: +79.0 ms more"), std::string::npos);
+}
+
 TEST(RunSummary, NamesTheCamerasThatWereNotUsed) {
   RunRecord record = circle(10);
   for (int k = 4; k < 10; ++k) record.odometry[static_cast<std::size_t>(k)].health.without_cameras = k < 7 ? 0b1 : 0b101;

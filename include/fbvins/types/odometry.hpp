@@ -46,8 +46,6 @@ enum class HealthReason {
   pressure_disagrees,  ///< a barometer does: it is left out
 };
 inline constexpr HealthReason kLastHealthReason = HealthReason::pressure_disagrees;
-/// Whether it is that of an aiding sensor that is left out: the pose is as good as without it.
-constexpr bool is_of_aiding(HealthReason reason) { return reason >= HealthReason::range_disagrees; }
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);
@@ -58,6 +56,8 @@ struct Health {
   std::uint8_t without_cameras = 0;  ///< bit c: camera c, which delivers nothing or contradicts the others, is not used
 
   bool has_pose() const { return state == HealthState::good || state == HealthState::degraded; }
+  /// Good, or as good as without an aiding sensor that is left out.
+  bool is_fine() const { return state == HealthState::good || reason >= HealthReason::range_disagrees; }
   bool operator==(const Health&) const = default;
 };
 /// In one sentence: "good", "degraded: one_camera, without camera 1".

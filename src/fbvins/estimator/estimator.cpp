@@ -70,14 +70,19 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   if (running_) track(frame, rest, out);
   else initialise(frame, rest, out);
+  if (trial_) stay_on_trial(frame, out);
   Odometry& odometry = out.odometry;
   odometry.id = frame.id;
   odometry.t = frame.t;
   odometry.time_offset_s = time_alignment_.correction().seconds();
   odometry.time_offset_sigma_s = time_alignment_.sigma_s();
-  if (running_) publish(odometry);
+  const bool is_public = running_ && !trial_;
+  if (is_public) {
+    waiting_since_.reset();
+    publish(odometry);
+  }
   odometry.reset_counter = reset_counter_;
-  if (running_) carried_.remember(window_, odometry, reading_noise_.clipped());
+  if (is_public) carried_.remember(window_, odometry, reading_noise_.clipped());
   if (odometry.health.state == HealthState::lost) restart();
   health_.pass(frame);
   out.landmarks = {next_update_++, reset_counter_, window_.known().take_new()};
@@ -265,6 +270,7 @@ void Estimator::restart() {
   running_ = false;
   calibration_ = calibrated_;
   bias_refused_.reset();
+  trial_.reset();
   failed_solves_ = 0;
   ++reset_counter_;
   window_.clear();
@@ -297,10 +303,8 @@ void Estimator::publish(Odometry& out) {
   const bool moved_along = !monitor_.contradicted() && carried_.take_reset();
   if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
-  // A sensor that is left out does not trouble the pose.
-  const auto is_fine = [&] { return out.health.state == HealthState::good || is_of_aiding(out.health.reason); };
-  if (is_fine() && published_.pending_too_large()) apply_or_defer_correction(level.T_FB, out);
-  if (!is_fine() && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
+  if (out.health.is_fine() && published_.pending_too_large()) apply_or_defer_correction(level.T_FB, out);
+  if (!out.health.is_fine() && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);

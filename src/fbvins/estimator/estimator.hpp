@@ -65,6 +65,11 @@ class Estimator {
   const SlidingWindow& window() const { return window_; }
 
  private:
+  /// Of a start with one camera: when it was made, and since when it would have been a good pose.
+  struct StartTrial {
+    Time since, good_since;
+  };
+
   void initialise(const TrackedFrame& frame, Duration rest, Estimate& out);
   void open_window(const InitialSolution& start);
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
@@ -79,6 +84,7 @@ class Estimator {
   bool start_is_good(const TrackedFrame& frame, const Odometry& solved);
   void compare_carried(const Odometry& solved);
   void refuse_start(Odometry& out);
+  void stay_on_trial(const TrackedFrame& frame, Estimate& out);
   void restart();
   void begin_new_W();
   void apply_or_defer_correction(const Pose<W, B>& level, Odometry& out);
@@ -112,6 +118,8 @@ class Estimator {
   WindowSolver solver_;
   WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused
   bool running_ = false;
+  std::optional<Time> waiting_since_;  ///< for the first pose, or the first one after a loss
+  std::optional<StartTrial> trial_;  ///< one camera: the window goes on, and nothing of it is published yet
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();

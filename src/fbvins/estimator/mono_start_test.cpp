@@ -97,5 +97,23 @@ TEST(EstimatorWithOneCamera, StartsInMotionAndKeepsItsScale) {
   }
 }
 
+/// (O9): a fast flight shows the scale to 15 % long before the velocity is known.
+TEST(EstimatorWithOneCamera, PublishesNothingBeforeTheVelocityIsCertain) {
+  for (const std::uint64_t seed : {21, 22, 23}) {
+    SimulatedFlight flight = flight_with_one_camera(Motion(2, 0.3), seed);
+    Estimator estimator(flight.rig, exact_noise());
+    int first_window = -1, first_pose = -1;
+    for (int k = 0; k < 200 && first_pose < 0; ++k) {
+      const Estimate estimate = estimator.process(flight.frame(k));
+      if (first_window < 0 && estimator.prior().valid) first_window = k;
+      if (estimate.odometry.health.has_pose()) first_pose = k;
+      else EXPECT_TRUE(estimate.keyframes.empty() && estimate.odometry.T_WB.p.isZero(0)) << k;
+      if (first_pose == k) EXPECT_LT(std::sqrt(estimate.odometry.velocity_covariance.trace()), 0.05) << seed;
+    }
+    EXPECT_GT(first_pose, first_window + 5) << seed;  // 0.3 s at 20 Hz
+    EXPECT_EQ(estimator.process(flight.frame(200)).odometry.reset_counter, 0u) << seed;
+  }
+}
+
 }  // namespace mono_start_test
 }  // namespace fbvins

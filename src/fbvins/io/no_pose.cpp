@@ -17,4 +17,17 @@ std::string no_pose_sentence(const std::map<std::string, int>& images_by_health)
                      share);
 }
 
+std::string few_good_sentence(const std::map<std::string, int>& images_by_health) {
+  int poses = 0, good = 0;
+  const std::pair<const std::string, int>* most = nullptr;
+  for (const auto& of : images_by_health) {
+    if (of.first == "good") good = of.second;
+    else if (of.first.starts_with("degraded") && (most == nullptr || of.second > most->second)) most = &of;
+    if (of.first == "good" || of.first.starts_with("degraded")) poses += of.second;
+  }
+  if (most == nullptr || 2 * good >= poses) return {};
+  return fmt::format("only {} of {} poses are good: health is {} in {} of them (docs/troubleshooting.md)", good, poses,
+                     most->first, most->second);
+}
+
 }  // namespace fbvins

@@ -10,6 +10,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "fbvins/io/no_pose.hpp"
+
 namespace fbvins {
 namespace trajectory_test {
 
@@ -288,6 +290,13 @@ TEST(Trajectory, OfAFlightWithoutAPoseHealthIsSaid) {
         << file.error().message;
   }
   std::filesystem::remove_all(folder);
+}
+
+TEST(NoPose, FewGoodPosesAreSaidWithTheirReason) {
+  EXPECT_EQ(few_good_sentence({{"good", 50}, {"degraded/contradiction", 50}, {"initialising/imu_gap", 90}}), "");
+  EXPECT_EQ(few_good_sentence({{"initialising/imu_gap", 90}}), "");
+  EXPECT_EQ(few_good_sentence({{"good", 1}, {"degraded/contradiction", 7}, {"degraded/few_tracks", 2}, {"lost/no_tracks", 40}}),
+            "only 1 of 10 poses are good: health is degraded/contradiction in 7 of them (docs/troubleshooting.md)");
 }
 
 }  // namespace trajectory_test
