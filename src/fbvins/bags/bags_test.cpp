@@ -13,6 +13,7 @@
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/core/rng.hpp"
+#include "fbvins/io/image_decode.hpp"
 
 namespace fbvins {
 namespace bags_test {

@@ -24,6 +24,7 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
+#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
@@ -233,8 +234,7 @@ class BagRecording {
     if (!topics_.depth.empty()) depth = sensor(topics_.depth, out_.rig.depth_camera());
     auto loader = std::make_unique<BagLoader>(std::move(bag), path_, std::move(cameras), std::move(depth));
     if (const int bits = loader->find_used_bits(out_.frames); bits < 16)
-      out_.info.warnings.push_back(
-          fmt::format("{}: images of 16 bits have values of {} bits only, and are scaled by {}", path_, bits, 1 << (16 - bits)));
+      out_.info.warnings.push_back(used_bits_sentence(path_, bits));
     out_.loader = std::move(loader);
   }
 

@@ -44,7 +44,7 @@ class EurocReader {
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
-    out_.loader = make_euroc_loader(std::move(files_), root_, folders(), out_.rig);
+    out_.loader = make_euroc_loader(std::move(files_), root_, folders(), out_.rig, out_.frames, out_.info);
     return std::move(out_);
   }
 

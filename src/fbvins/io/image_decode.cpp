@@ -40,11 +40,26 @@ Result<void> check_image_size(std::int64_t width, std::int64_t height) {
   return Error{ErrorCode::unsupported, fmt::format("an image of {} x {} pixels", width, height)};
 }
 
-Result<Image> decode_image(std::string_view bytes) {
+Result<Image> decode_image(std::string_view bytes, int used_bits) {
   if (bytes.empty()) return Error{ErrorCode::malformed, "the file is empty"};
-  if (bytes.starts_with(kPngSignature)) return decode_png(bytes);
+  if (bytes.starts_with(kPngSignature)) return decode_png(bytes, used_bits);
   if (bytes.starts_with("\xFF\xD8\xFF")) return decode_jpeg(bytes);
   return Error{ErrorCode::malformed, "neither PNG nor JPEG"};
+}
+
+std::optional<std::uint16_t> largest_value_of_png(std::string_view bytes) {
+  return bytes.starts_with(kPngSignature) ? largest_value_of_png16(bytes) : std::nullopt;
+}
+
+int bits_used_for(std::uint16_t largest) {
+  for (const int bits : {8, 10, 12})
+    if (largest > 0 && largest < 1 << bits) return bits;
+  return 16;
+}
+
+std::string used_bits_sentence(const std::string& recording, int bits) {
+  return fmt::format("{}: images of 16 bits have values of {} bits only, and are scaled by {}", recording, bits,
+                     1 << (16 - bits));
 }
 
 Result<DepthImage> decode_depth(std::string_view bytes) {
