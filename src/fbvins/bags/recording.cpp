@@ -28,6 +28,7 @@
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
@@ -182,8 +183,19 @@ class BagRecording {
     };
     if (topics_.cameras.size() > 1 && info.left.unpaired == info.left.listed) return never(topics_.cameras[1]);
     if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(topics_.depth);
-    if (!topics_.imu.empty()) out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);
+    if (Result<void> read = read_imu(); !read) return read;
     return read_aiding(contents_, topics_, out_);
+  }
+
+  Result<void> read_imu() {
+    if (topics_.imu.empty()) return {};
+    RowCounts& counts = out_.info.imu_rows;
+    out_.imu = readings_on(contents_, topics_.imu, topics_.accel, counts);
+    const std::string shared = shared_stamps(counts.rows, counts.duplicates);
+    if (2 * counts.duplicates > counts.rows)
+      return Error{ErrorCode::malformed, fmt::format("{}: of {} readings {}", topics_.imu, counts.rows, shared)};
+    if (!shared.empty()) out_.info.warnings.push_back(fmt::format("{}: {}", topics_.imu, shared));
+    return {};
   }
 
   Result<void> cut() {
@@ -193,7 +205,7 @@ class BagRecording {
     const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
     const Time first = frames.front().t + offset, last = frames.back().t + offset;
     if (!out_.imu.empty() && (out_.imu.back().t < first || out_.imu.front().t > last))
-      return Error{ErrorCode::malformed, fmt::format("the stamps on {} do not overlap the images'", topics_.imu)};
+      return no_overlap(topics_.imu, {out_.imu.front().t, out_.imu.back().t}, {first, last}, is_part(o));
     if (begins_later(o)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     if (begins_later(o)) std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < first - kImuLeadIn; });
     return {};

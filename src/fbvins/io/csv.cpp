@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
@@ -92,10 +93,10 @@ std::vector<bool> longest_increasing(const std::vector<Time>& stamps) {
 
 Result<void> judge(const RowCounts& counts, const std::string& file) {
   if (counts.rows == 0) return Error{ErrorCode::malformed, fmt::format("{}: there are no data rows in it", file)};
-  if (2 * counts.bad() > counts.rows)
-    return Error{ErrorCode::malformed,
-                 fmt::format("{} ({} of {} rows are unusable)", counts.first_bad, counts.bad(), counts.rows)};
-  return {};
+  if (2 * counts.bad() <= counts.rows) return {};
+  const std::string shared = shared_stamps(counts.rows, counts.duplicates);
+  return Error{ErrorCode::malformed, fmt::format("{} ({} of {} rows are unusable){}{}", counts.first_bad, counts.bad(),
+                                                 counts.rows, shared.empty() ? "" : ": ", shared)};
 }
 
 }  // namespace fbvins

@@ -19,7 +19,7 @@
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
-#include "fbvins/io/numbers.hpp"
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
@@ -258,10 +258,7 @@ class EurocReader {
     const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
     const Time first = out_.frames.front().t + offset, last = out_.frames.back().t + offset;
     if (out_.imu.back().t < first || out_.imu.front().t > last)
-      return Error{ErrorCode::malformed,
-                   fmt::format("{}: stamps {} to {} s do not overlap the images' {} to {} s", named("imu0/data.csv"),
-                               format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t), format_seconds(first),
-                               format_seconds(last))};
+      return no_overlap(named("imu0/data.csv"), {out_.imu.front().t, out_.imu.back().t}, {first, last}, is_part(options_));
     if (begins_later(options_)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     return {};
   }
