@@ -246,8 +246,13 @@ Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topi
   return {};
 }
 
-Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {
+Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics, const std::string& given) {
   const auto missing = [&](const std::string& what) {
+    if (!given.empty())
+      return Error{ErrorCode::not_found,
+                   fmt::format("{} has no place of the cameras on the IMU, nor has the bag ({}): record /tf_static, or give the "
+                               "lenses as Kalibr's chain with T_cam_imu",
+                               given, printable(what))};
     return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with --calibration", printable(what))};
   };
   for (const std::string& topic : topics.cameras)

@@ -14,11 +14,13 @@
 #include "fbvins/bags/bag_loader.hpp"
 #include "fbvins/bags/bag_stamps.hpp"
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/bags/given_calibration.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/options.hpp"
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -114,7 +116,7 @@ class BagRecording {
       if (!named_) topics_.cameras = calibrated_cameras(contents_, topics_);
       if (!options_.calibration.empty())
         if (Result<void> taken = take_camera_info(options_.calibration, topics_, contents_); !taken) return taken;
-      const Result<StereoRig> rig = rig_of(contents_, topics_);
+      const Result<StereoRig> rig = rig_of(contents_, topics_, options_.calibration);
       if (!rig) return rig.error();
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
@@ -132,6 +134,8 @@ class BagRecording {
       rig_ = in_order(*rig_, order);
       out_.info.warnings.push_back(order_sentence(options_.calibration, order));
     }
+    if (!options_.calibration.empty())
+      for (std::string& doubt : chain_doubts(options_.calibration)) out_.info.warnings.push_back(std::move(doubt));
     std::vector<MountedCamera> cameras;
     for (std::size_t i = 0; i < topics_.cameras.size(); ++i) cameras.push_back(rig_->mounted(static_cast<int>(i)));
     out_.rig = *rig_;
@@ -272,49 +276,6 @@ bool is_flight_record(const std::string& path) {
   (void)reader->next();  // attachments are before the first message
   return std::any_of(reader->attachments().begin(), reader->attachments().end(),
                      [](const McapAttachment& a) { return a.name == kCalibrationAttachment; });
-}
-
-/// TUM-VI (vision.in.tum.de/data/datasets/visual-inertial-dataset): an EuRoC folder whose calibration is Kalibr's, in dso/.
-void find_tum_vi(const fs::path& folder, RecordingOptions& options) {
-  std::error_code ignored;
-  if (!options.calibration.empty() || fs::exists(folder / "mav0/cam0/sensor.yaml", ignored)) return;
-  for (const char* name : {"dso/camchain.yaml", "dso/camchain-imucam.yaml"})
-    if (fs::exists(folder / name, ignored)) options.calibration = (folder / name).string();
-  if (!options.calibration.empty() && options.imu_calibration.empty() && fs::exists(folder / "dso/imu_config.yaml", ignored))
-    options.imu_calibration = (folder / "dso/imu_config.yaml").string();
-}
-
-/// Of several IMUs in the file that one whose topic is used: by --topics, or as the bag has it alone.
-void choose_imu(const std::string& path, RecordingOptions& options) {
-  std::string& file = options.imu_calibration;
-  if (topics_of_imus(file).empty()) return;
-  std::vector<std::string> recorded = options.topics;
-  if (const auto bag = open_bag(path); bag && imu_of_topics(file, recorded) == file) {
-    (*bag)->only({}, {5'000'000'000});
-    while ((*bag)->next()) continue;
-    for (const BagTopic& topic : (*bag)->topics())
-      if (topic.type == "sensor_msgs/Imu") recorded.push_back(topic.name);
-  }
-  file = imu_of_topics(file, recorded);
-}
-
-/// Puts the calibration that is given with a recording into its options. Kalibr's is left to the recording's reader, which has
-/// noise figures to go with it.
-Result<void> take_calibration(bool bag, RecordingOptions& options) {
-  if (options.calibration.empty()) {
-    options.dataset.kalibr_imu = options.imu_calibration;  // with the recording's own cameras
-    return {};
-  }
-  if (bag && is_camera_info(options.calibration)) {  // with the places that the bag has
-    options.dataset.kalibr_imu = options.imu_calibration;
-    return {};
-  }
-  const Result<StereoRig> rig = load_calibration(options.calibration, options.imu_calibration);
-  if (!rig) return rig.error();
-  if (bag || !is_kalibr(options.calibration)) return options.dataset.rig = *rig, Result<void>{};
-  options.dataset.kalibr_camchain = options.calibration;
-  options.dataset.kalibr_imu = options.imu_calibration;
-  return {};
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/calibration.hpp"
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
@@ -149,6 +150,7 @@ class EurocReader {
     const auto& path = options_.kalibr_imu;
     Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path), imu.noise);
     if (!rig) return rig.error();
+    for (std::string& doubt : chain_doubts(options_.kalibr_camchain)) warn(std::move(doubt));
     const std::vector<std::string> rostopics = rostopics_of(options_.kalibr_camchain);
     std::vector<std::string> folders;
     for (int i = 0; i < rig->camera_count(); ++i) folders.push_back(fmt::format("cam{}", i));
