@@ -5,6 +5,7 @@
 usage: recordings.py FBVINS
 """
 import json
+import math
 import pathlib
 import random
 import re
@@ -194,6 +195,80 @@ class Images(Recordings):
                 sentence = f"images of 16 bits have values of {bits} bits only, and are scaled by {1 << (16 - bits)}"
                 self.assertEqual(sentence in said, bits < 16, said)
                 self.assertTrue(images == eight or bits == 16)
+
+
+    def test_names_may_begin_with_the_folder(self):
+        for name, of in (("data", "data/{}.png"), ("whole", "mav0/cam0/data/{}.png")):
+            about, said = self.info(write(self.folder / name, names=of.format))
+            self.assertEqual((about["left"]["images"], about["right"]["missing"], said.count("no such file")), (FRAMES, 0, 0))
+        refused = run("info", write(self.folder / "outside", names="/home/me/data/{}.png".format))
+        self.assertEqual(refused.returncode, 2, refused.stdout)
+
+    def test_what_is_no_image_and_no_row_is_named(self):
+        for found, content in (("BMP", b"BM" + bytes(80)), ("TIFF", b"II*\0" + bytes(80)), ("PGM", b"P5\n2 2\n255\n1234")):
+            refused = run("info", write(self.folder / found, image=lambda camera, i, content=content: content))
+            self.assertIn(f"{found}, neither PNG nor JPEG: write images as PNG", refused.stderr)
+        recording = write(self.folder / "rows")
+        path = recording / "mav0/imu0/data.csv"
+        rows = path.read_text(encoding="utf-8")
+        for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+            path.write_text(rows.replace(",", separator), encoding="utf-8")
+            self.assertIn(f"1 columns where 7 are needed: they are between {name}, and commas are needed", run("info", recording).stderr)
+
+    def test_images_that_are_stamped_apart(self):
+        _, said = self.info(write(self.folder / "own", stamps=lambda camera, i: FIRST_NS + 50_000_000 * i + 20_000_000 * camera))
+        self.assertIn("--pair-tolerance says so", said)
+
+
+class Trajectories(Recordings):
+    """Of one flight, written as people's programs write it."""
+
+    def rows(self):
+        for i in range(80):
+            a = 0.05 * i
+            yield FIRST_NS + 50_000_000 * i, (math.cos(a), math.sin(a), 0.01 * i), (math.cos(a / 2), 0.0, 0.0, math.sin(a / 2))
+
+    def compared(self, name, text, *more):
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        done = run("eval", self.folder / "truth.txt", path, "--json", *more)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        result = json.loads(done.stdout)
+        self.assertEqual(result["pairs"], 80)
+        self.assertLess(result["ape_m"]["max"], 1e-5)
+        return result, done.stderr
+
+    def test_what_others_write(self):
+        rows = list(self.rows())
+        tum = [f"{t / 1e9:.6f} {p[0]:.8f} {p[1]:.8f} {p[2]:.8f} {q[1]:.8f} {q[2]:.8f} {q[3]:.8f} {q[0]:.8f}\n" for t, p, q in rows]
+        (self.folder / "truth.txt").write_text("".join(tum), encoding="utf-8")
+        ros = ("%time,field.header.seq,field.header.stamp,field.header.frame_id,field.pose.pose.position.x,field.pose.pose.position.y,field.pose.pose.position.z,"
+               "field.pose.pose.orientation.x,field.pose.pose.orientation.y,field.pose.pose.orientation.z,field.pose.pose.orientation.w,field.pose.covariance0\n"
+               + "".join(f"{t + 30_000_000},{i},{t},world,{p[0]},{p[1]},{p[2]},{q[1]},{q[2]},{q[3]},{q[0]},0.1\n" for i, (t, p, q) in enumerate(rows)))
+        px4 = ("timestamp,timestamp_sample,pose_frame,position[0],position[1],position[2],q[0],q[1],q[2],q[3],velocity[0]\n"
+               + "".join(f"{t // 1000 + 30000},{t // 1000},1,{p[0]},{p[1]},{p[2]},{q[0]},{q[1]},{q[2]},{q[3]},0.5\n" for t, p, q in rows))
+        german = "t;x;y;z;qx;qy;qz;qw\n" + "".join(row.replace(" ", ";").replace(".", ",") for row in tum)
+        swapped = "stamp,qw,qx,qy,qz,z,y,x\n" + "".join(f"{t},{q[0]},{q[1]},{q[2]},{q[3]},{p[2]},{p[1]},{p[0]}\n" for t, p, q in rows)
+        mixed = list(tum)
+        random.Random(1).shuffle(mixed)
+        for name, text, words in (("ros.csv", ros, "columns by their names"), ("px4.csv", px4, "columns by their names"), ("german.csv", german, "decimal commas"),
+                                  ("swapped.csv", swapped, "columns by their names"), ("mixed.txt", "".join(mixed), "rows out of order, sorted by their stamps")):
+            with self.subTest(name):
+                result, said = self.compared(name, text)
+                self.assertIn(words, said)
+                self.assertEqual(said.count("\n"), 1, said)
+                self.assertLess(result["ape_deg"]["max"], 1e-3)
+                self.assertTrue(result["orientations_compared"])
+        local = ("timestamp,timestamp_sample,ref_timestamp,x,y,z,vx,vy,vz,heading\n"
+                 + "".join(f"{t // 1000 + 9},{t // 1000},5,{p[0]},{p[1]},{p[2]},0.1,0.2,0.3,1.5\n" for t, p, _ in rows))
+        positions = "".join(" ".join(row.split()[:4]) + "\n" for row in tum)
+        for name, text in (("local.csv", local), ("positions.txt", positions), ("positions.csv", positions.replace(" ", ",")), ("zero.txt", positions.replace("\n", " 0 0 0 1\n"))):
+            with self.subTest(name):
+                result, said = self.compared(name, text)
+                self.assertIn("positions without orientations", said)
+                self.assertFalse(result["orientations_compared"])
+                self.assertEqual(result["ape_deg"]["count"], 0)
+        self.assertIn("orientations are not compared", run("eval", self.folder / "truth.txt", self.folder / "positions.txt").stdout)
 
 
 if __name__ == "__main__":

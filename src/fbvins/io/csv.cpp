@@ -38,6 +38,16 @@ std::vector<CsvLine> data_lines(std::string_view text) {
   return lines;
 }
 
+std::string columns_sentence(std::string_view row, std::size_t columns, std::string_view wanted) {
+  const char* instead = columns > 1                                     ? nullptr
+                        : row.find(';') != std::string_view::npos       ? "semicolons"
+                        : row.find('\t') != std::string_view::npos      ? "tabs"
+                        : trim(row).find(' ') != std::string_view::npos ? "blanks"
+                                                                        : nullptr;
+  const std::string why = instead != nullptr ? fmt::format(": they are between {}, and commas are needed", instead) : "";
+  return fmt::format("{} columns where {} are needed{}", columns, wanted, why);
+}
+
 void split_at_commas(std::string_view line, std::vector<std::string_view>& fields) { split_at(',', line, fields); }
 
 void split_at(char separator, std::string_view line, std::vector<std::string_view>& fields) {

@@ -174,7 +174,11 @@ TEST(DecodeJpeg, CutOffIsAnError) {
 
 TEST(DecodeImage, OtherBytesAreRefused) {
   EXPECT_EQ(decode_image("").error().message, "the file is empty");
-  EXPECT_EQ(decode_image("GIF89a").error().message, "neither PNG nor JPEG");
+  EXPECT_EQ(decode_image("GIF89a").error().message, "GIF, neither PNG nor JPEG: write images as PNG");
+  EXPECT_EQ(decode_image("BM\x36").error().message.substr(0, 3), "BMP");
+  EXPECT_EQ(decode_image("P5\n3 1\n255\n").error().message.substr(0, 3), "PGM");
+  EXPECT_EQ(decode_image(std::string_view("MM\0*", 4)).error().message.substr(0, 4), "TIFF");
+  EXPECT_EQ(decode_image("GLB").error().message, "neither PNG nor JPEG");
 }
 
 }  // namespace image_decode_test
