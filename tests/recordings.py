@@ -268,6 +268,12 @@ class Trajectories(Recordings):
                 self.assertIn("positions without orientations", said)
                 self.assertFalse(result["orientations_compared"])
                 self.assertEqual(result["ape_deg"]["count"], 0)
+        imu = ("%time,field.header.stamp,field.orientation.x,field.orientation.y,field.orientation.z,field.orientation.w,field.angular_velocity.x,field.angular_velocity.y,"
+               "field.angular_velocity.z\n" + "".join(f"{t},{t},0,0,0,1,0.1,0.2,0.3\n" for t, _, _ in rows))
+        places = "time,lat,lon,alt\n" + "".join(f"{t},{47 + 1e-6 * p[0]},{8 + 1e-6 * p[1]},{p[2]}\n" for t, p, _ in rows)
+        for name, text in (("imu.csv", imu), ("places.csv", places)):
+            (self.folder / name).write_text(text, encoding="utf-8")
+            self.assertEqual(run("eval", self.folder / "truth.txt", self.folder / name).returncode, 2, name)
         self.assertIn("orientations are not compared", run("eval", self.folder / "truth.txt", self.folder / "positions.txt").stdout)
 
 

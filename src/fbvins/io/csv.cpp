@@ -12,7 +12,7 @@ namespace {
 
 bool looks_like_header(std::string_view line) {
   const char c = line.front();
-  const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '"';
+  const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '"' || c == '%';
   return letter && !parse_double(line.substr(0, line.find_first_of(", \t")));  // "nan,..." is a bad row
 }
 

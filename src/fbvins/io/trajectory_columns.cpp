@@ -14,7 +14,6 @@
 namespace fbvins {
 namespace {
 
-constexpr const char* kPositionsAlone = "positions without orientations";
 constexpr std::size_t kRowsLooked = 20, kPositionColumns = 4;
 
 /// Lower-case, without quotes, a mark of a comment, or a unit in brackets.
@@ -40,10 +39,13 @@ std::vector<std::string> names_of(std::string_view header, char separator) {
 
 using Columns = std::vector<std::size_t>;
 
+/// Names of several parts may stand behind others: field.pose.pose.position.x.
 std::optional<std::size_t> column_of(const std::vector<std::string>& names, std::string_view wanted) {
+  const bool of_parts = wanted.find_first_of(".[") != std::string_view::npos;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string_view name = names[i];
-    const bool behind_dot = name.size() > wanted.size() && name.ends_with(wanted) && name[name.size() - wanted.size() - 1] == '.';
+    const bool behind_dot =
+        of_parts && name.size() > wanted.size() && name.ends_with(wanted) && name[name.size() - wanted.size() - 1] == '.';
     if (name == wanted || behind_dot) return i;
   }
   return std::nullopt;
@@ -67,6 +69,7 @@ Columns find_columns(const std::vector<std::string>& names) {
   Columns out = columns_of<1>(names, {{"header.stamp"}, {"timestamp_sample"}, {"timestamp"}, {"stamp"}, {"time"}, {"t"}});
   const Columns p = columns_of<3>(names, {{"position.x", "position.y", "position.z"},
                                           {"translation.x", "translation.y", "translation.z"},
+                                          {"point.x", "point.y", "point.z"},
                                           {"position[0]", "position[1]", "position[2]"},
                                           {"position_x", "position_y", "position_z"},
                                           {"pos_x", "pos_y", "pos_z"},
@@ -112,6 +115,13 @@ void split(char separator, std::string_view line, std::vector<std::string_view>&
   separator == ' ' ? split_at_blanks(line, fields) : split_at(separator, line, fields);
 }
 
+/// Of the lines before the rows the last one names the columns.
+std::vector<std::string> names_above(std::string_view text, const std::vector<CsvLine>& data, char separator) {
+  const std::vector<CsvLine> lines = lines_of(text);
+  const auto first = std::ranges::find(lines, data.front().number, &CsvLine::number);
+  return first == lines.begin() ? std::vector<std::string>{} : names_of(std::prev(first)->text, separator);
+}
+
 /// In the line that it had in the file.
 void add_row(int line, const std::string& row, int& lines, std::string& out) {
   for (; lines < line - 1; ++lines) out += '\n';
@@ -146,20 +156,17 @@ std::optional<RewrittenRows> with_decimal_points(std::string_view text) {
 }
 
 std::optional<RewrittenRows> by_column_names(std::string_view text) {
-  const std::vector<CsvLine> lines = lines_of(text), data = data_lines(text);
-  if (data.empty() || lines.front().number == data.front().number) return std::nullopt;
-  // Of the comments before the rows the last one names the columns.
-  const auto first = std::ranges::find(lines, data.front().number, &CsvLine::number);
+  const std::vector<CsvLine> data = data_lines(text);
+  if (data.empty()) return std::nullopt;
   const char separator = separator_of(data.front().text);
-  const std::vector<std::string> names = names_of(std::prev(first)->text, separator);
+  const std::vector<std::string> names = names_above(text, data, separator);
   std::vector<std::string_view> fields;
   split(separator, data.front().text, fields);
   const Columns columns = find_columns(names);
   if (columns.empty() || names.size() < fields.size() || in_usual_places(columns)) return std::nullopt;
   const bool oriented = columns.size() == 8;
   if (!oriented && names_angles(names)) return std::nullopt;
-  RewrittenRows out{
-      "", oriented ? std::string("columns by their names") : fmt::format("columns by their names, {}", kPositionsAlone), true};
+  RewrittenRows out{"", "columns by their names", true};
   int written = 0;
   for (const CsvLine& line : data) {
     split(separator, line.text, fields);
@@ -175,12 +182,15 @@ std::optional<RewrittenRows> with_no_orientation(std::string_view text) {
   const std::vector<CsvLine> data = data_lines(text);
   if (data.empty()) return std::nullopt;
   const char separator = separator_of(data.front().text);
+  // Four columns of other names: latitudes, rates.
+  if (const auto names = names_above(text, data, separator); names.size() == kPositionColumns && find_columns(names).empty())
+    return std::nullopt;
   std::vector<std::string_view> fields;
   for (std::size_t i = 0; i < std::min(data.size(), kRowsLooked); ++i) {
     split(separator, data[i].text, fields);
     if (fields.size() != kPositionColumns || !parse_double(fields[0])) return std::nullopt;
   }
-  RewrittenRows out{"", kPositionsAlone, separator != ' '};
+  RewrittenRows out{"", "", separator != ' '};
   const char* none = separator == ' ' ? " 0 0 0 1" : separator == ';' ? ";1;0;0;0" : ",1,0,0,0";
   int written = 0;
   for (const CsvLine& line : data) add_row(line.number, std::string(line.text) + none, written, out.text);
