@@ -33,7 +33,10 @@ std::vector<std::string> names_of(std::string_view header, char separator) {
     split_at(separator, header, fields);
   }
   std::vector<std::string> out;
-  for (const std::string_view field : fields) out.push_back(plain_name(field));
+  for (const std::string_view field : fields) {
+    const bool unit = separator == ' ' && (field.starts_with('[') || field.starts_with('('));
+    if (!unit) out.push_back(plain_name(field));
+  }
   return out;
 }
 
@@ -163,7 +166,9 @@ std::optional<RewrittenRows> by_column_names(std::string_view text) {
   std::vector<std::string_view> fields;
   split(separator, data.front().text, fields);
   const Columns columns = find_columns(names);
-  if (columns.empty() || names.size() < fields.size() || in_usual_places(columns)) return std::nullopt;
+  // Between blanks a name of two words is two: then they are no names of columns.
+  const bool fits = separator == ' ' ? names.size() == fields.size() : names.size() >= fields.size();
+  if (columns.empty() || !fits || in_usual_places(columns)) return std::nullopt;
   const bool oriented = columns.size() == 8;
   if (!oriented && names_angles(names)) return std::nullopt;
   RewrittenRows out{"", "columns by their names", true};
