@@ -18,8 +18,8 @@ namespace {
 
 constexpr const char* kExamples =
     R"(The name decides the format: FILE.bag is a ROS 1 bag; FILE.mcap a flight record, which ROS 2 programs can read;
-any other name is an EuRoC folder, or with --rosbag2 one that `ros2 bag` plays (MCAP). Images become 8-bit grey. Calibration with noise, range and time offset, and
-ground truth are kept (of truth in a bag or record: the poses), and the outputs of a flight record: all of them in a
+any other name is an EuRoC folder, or with --rosbag2 one that `ros2 bag` plays (MCAP). Images become 8-bit grey. Calibration with noise, range, time offset, line
+delay and masks, and ground truth are kept (of truth in a bag or record: the poses), and the outputs of a flight record: all of them in a
 record, the poses in a bag (/odometry) or folder (odometry_tum.txt).
 
 examples:

@@ -17,7 +17,8 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(GROUND_TRUTH is a trajectory file (TUM's, EuRoC's, those of VINS-Mono, VINS-Fusion, ORB-SLAM3 and OpenVINS), a recording with
+    R"(GROUND_TRUTH is a trajectory file (TUM's, EuRoC's, those of VINS-Mono, VINS-Fusion, ORB-SLAM3 and OpenVINS, a CSV whose header
+names the columns, as `rostopic echo -p` and ulog2csv write it, positions alone), a recording with
 ground truth, of which the share of images with a pose is printed as well, or a bag with a topic of PoseStamped,
 TransformStamped or Odometry; ESTIMATE is a trajectory file or such a bag. The stamps of both are matched as by evo:
 the nearest, at most --max-diff apart.
@@ -95,9 +96,15 @@ int evaluate_files(const Arguments& arguments) {
   const auto truth =
       arguments.hand_eye ? read_markers_as_truth(arguments.truth, *estimate) : read_truth(arguments.truth, arguments.topic);
   if (!truth) return fail(truth.error().message);
-  const EvaluationOptions options = options_of(arguments);
+  EvaluationOptions options = options_of(arguments);
+  for (const auto& [poses, of] : {std::pair(&truth->poses, &arguments.truth), {&*estimate, &arguments.estimate}})
+    if (!has_orientations(*poses)) {
+      options.orientations = false;
+      note(fmt::format("{}: positions without orientations, which are not compared", *of));
+    }
   const Misreading misread = find_misreading(truth->poses, *estimate, options.association);
-  if (!misread.said.empty()) note(fmt::format("{}: {}, as the truth shows, and is read so", arguments.estimate, misread.said));
+  if (!misread.said.empty())
+    note(fmt::format("{}: {}, as the truth shows; the file is read accordingly", arguments.estimate, misread.said));
   const auto evaluation = evaluate(truth->poses, misread.estimate, options);
   if (!evaluation) return fail(evaluation.error().message);
   std::optional<Coverage> coverage;

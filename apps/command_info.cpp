@@ -17,6 +17,7 @@
 #include "apps/recording_report.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/bags/bag_survey.hpp"
+#include "fbvins/checkup/stamps.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/known_file.hpp"
@@ -189,7 +190,11 @@ int show(const Arguments& arguments) {
       if (const auto file = file_of(arguments.recording.path)) return show_file(arguments, *file);
     return fail(data.error().message);
   }
-  RecordingWarnings().print((*data)->info());
+  const DatasetInfo& info = (*data)->info();
+  RecordingWarnings().print(info);
+  if (info.imu_samples > 0)
+    if (const auto apart = check_ends({info.first_image, info.last_image, info.first_imu, info.last_imu}, (*data)->rig()))
+      warn(to_text(*apart));
   if (arguments.json) fmt::print("{}\n", describe(**data).dump(2));
   else print_text(**data);
   return kOk;

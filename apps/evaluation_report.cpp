@@ -12,6 +12,17 @@ std::string row(std::string_view name, const ErrorStatistics& s) {
                      s.count);
 }
 
+/// Where the truth says nothing.
+std::string gaps_of(const Evaluation& e) {
+  std::string text;
+  if (e.longest_truth_gap_s > 0)
+    text +=
+        fmt::format("truth for {:.1f} % of the estimate's time, longest gap {:.2f} s: the errors above say nothing of the rest\n",
+                    100 * e.truth_share, e.longest_truth_gap_s);
+  if (e.end_drift_m) text += fmt::format("drift at the end, aligned before the first gap: {:.4f} m\n", *e.end_drift_m);
+  return text;
+}
+
 Json numbers(const auto& vector) { return Json(std::vector<double>(vector.begin(), vector.end())); }
 
 Json pose_nees_json(const PoseNees& n) {
@@ -34,6 +45,7 @@ Json to_json(const Evaluation& e, Alignment alignment) {
                            {"rotation_wxyz", {s.q.w(), s.q.x(), s.q.y(), s.q.z()}},
                            {"translation_m", numbers(s.p)}};
   json["ape_m"] = to_json(e.absolute_m);
+  json["orientations_compared"] = e.orientations;
   json["ape_deg"] = to_json(e.absolute_rotation_deg);
   json["rpe_per_metre_m"] = to_json(e.per_metre_m);
   json["rpe_per_metre_deg"] = to_json(e.per_metre_deg);
@@ -65,17 +77,13 @@ std::string to_table(const Evaluation& e, Alignment alignment) {
   if (alignment == Alignment::sim3) text += fmt::format("scale of the estimate {:.6f}\n", 1 / e.alignment.scale);
   text += fmt::format("{:<24}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}\n", "", "Max", "Mean", "Median", "RMSE", "Std", "Count");
   text += row("absolute [m]", e.absolute_m);
+  if (!e.orientations) return text + "orientations are not compared, nor relative errors, which need them\n" + gaps_of(e);
   text += row("absolute [deg]", e.absolute_rotation_deg);
   text += row("relative per metre [m]", e.per_metre_m);
   text += row("relative per metre [deg]", e.per_metre_deg);
   text += row("relative per 1 s [m]", e.per_second_m);
   text += row("relative per 1 s [deg]", e.per_second_deg);
-  if (e.longest_truth_gap_s > 0)
-    text +=
-        fmt::format("truth for {:.1f} % of the estimate's time, longest gap {:.2f} s: the errors above say nothing of the rest\n",
-                    100 * e.truth_share, e.longest_truth_gap_s);
-  if (e.end_drift_m) text += fmt::format("drift at the end, aligned before the first gap: {:.4f} m\n", *e.end_drift_m);
-  return text;
+  return text + gaps_of(e);
 }
 
 std::string to_line(const Coverage& c) {

@@ -47,7 +47,8 @@ bool is_foreign_calibration(const std::string& path) {
   constexpr std::size_t kMost_bytes = 1u << 20u;
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) return true;
-  const std::string text = beginning(path, kMost_bytes);
+  // Two files of camera_info.
+  const std::string text = beginning(fs::exists(path, ignored) ? path : path.substr(0, path.find(',')), kMost_bytes);
   return !text.empty() && text.find("T_cam_imu") == std::string::npos;
 }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <string>
 
 #include "apps/bridge_source.hpp"
@@ -50,6 +51,11 @@ Result<DatasetOptions> with_calibration(DatasetOptions options) {
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options) {
   const auto colon = name.find(':');
   const std::string kind = name.substr(0, colon), where = colon == std::string::npos ? "" : name.substr(colon + 1);
+  // A file that is not there is said before anything that its reader needs.
+  const bool of_realsense = kind == "d435i" || kind == "realsense";
+  if (const auto end = where.find(".bag"); of_realsense && end != std::string::npos)
+    if (const std::string file = where.substr(0, end + 4); !std::filesystem::exists(file))
+      return Error{ErrorCode::not_found, fmt::format("{}: no such file", file)};
 #ifdef FBVINS_WITH_REALSENSE
   if (kind == "d435i" || kind == "realsense") return as_source(RealsenseSource::open(where, options));
 #endif

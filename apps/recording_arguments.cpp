@@ -17,7 +17,8 @@ void RecordingArguments::add_to(CLI::App& command) {
 void RecordingArguments::add_options_to(CLI::App& command) {
   command.add_option(
       "--calibration", calibration,
-      "calibration file instead of the recording's own: of Kalibr, OpenVINS, Basalt or VINS-Fusion, or an EuRoC folder");
+      "calibration instead of the recording's own: a file of Kalibr, OpenVINS, Basalt, VINS-Fusion, VINS-Mono, ORB-SLAM3, "
+      "Kimera-VIO or an OAK, a folder or zip of EuRoC's, or for a bag left.yaml,right.yaml of ROS's camera_info");
   command.add_option("--imu-calibration", imu_calibration,
                      "the IMU alone: imu.yaml of Kalibr or OpenVINS, or axes in RealSense's JSON");
   // One argument, so that a recording which follows it is not taken for another topic.

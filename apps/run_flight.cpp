@@ -57,7 +57,10 @@ Result<Flight> process(const FlightArguments& arguments, const Config& config, D
   system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
   system->on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
   system->on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
-  FirstSeconds look(data.rig());
+  const DatasetInfo& info = data.info();
+  std::optional<StampEnds> ends;
+  if (info.imu_samples > 0) ends = {info.first_image, info.last_image, info.first_imu, info.last_imu};
+  FirstSeconds look(data.rig(), ends);
   bool looking = listener.on_finding != nullptr;
   const auto end_look = [&] {
     looking = false;

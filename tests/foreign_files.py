@@ -218,6 +218,16 @@ FILES = [
     ("ZED's SN.conf", "SN12345.conf", lambda _: "[LEFT_CAM_HD]\nfx=699.1\nfy=699.2\ncx=640.1\ncy=360.2\nk1=-0.17\nk2=0.02\n\n[RIGHT_CAM_HD]\nfx=700.1\nfy=700.2\ncx=641.0\ncy=361.0\nk1=-0.17\nk2=0.02\n", "calibration", "ZED"),
     ("OpenCV's stereo calibration", "intrinsics.yml", lambda _: "%YAML:1.0\n---\n" + opencv("M1", [[F[0], 0, C[0]], [0, F[1], C[1]], [0, 0, 1]], 3, 3) + opencv("D1", [[*D, 0.0]], 1, 5)
      + opencv("M2", [[F1[0], 0, C1[0]], [0, F1[1], C1[1]], [0, 0, 1]], 3, 3) + opencv("D2", [[*D1, 0.0]], 1, 5), "calibration", "OpenCV"),
+    ("the same with K and R, T", "stereo.yml", lambda _: "%YAML:1.0\n---\nimage_width: 752\n" + opencv("K1", [[F[0], 0, C[0]], [0, F[1], C[1]], [0, 0, 1]], 3, 3) + opencv("D1", [[*D]], 1, 4)
+     + opencv("K2", [[F1[0], 0, C1[0]], [0, F1[1], C1[1]], [0, 0, 1]], 3, 3) + opencv("D2", [[*D1]], 1, 4) + opencv("R", [row[:3] for row in T_C1C0[:3]], 3, 3)
+     + opencv("T", [[T_C1C0[i][3]] for i in range(3)], 3, 1), "calibration", "OpenCV's calibration of a stereo pair"),
+    ("Kalibr's results-imucam.txt", "results-imucam.txt", lambda _: "Calibration results\n===================\nNormalized Residuals\n----------------------------\n"
+     "Reprojection error (cam0):     mean 0.5, median 0.4, std: 0.3\n\nTransformation (cam0):\n-----------------------\nT_ci:  (imu0 to cam0): \n[[ 0.01 0.99 -0.02 0.06]]\n", "calibration", "camchain-imucam.yaml"),
+    ("MATLAB's stereoParameters", "stereoParams.txt", lambda _: f"  stereoParameters with properties:\n\n   CameraParameters1: [1x1 cameraParameters]\n    TranslationOfCamera2: [-110.07 0.39 -0.85]\n", "calibration", "MATLAB"),
+    ("Bouguet's Calib_Results.m", "Calib_Results.m", lambda _: f"% Intrinsic and Extrinsic Camera Parameters\nfc = [ {F[0]} ; {F[1]} ];\ncc = [ {C[0]} ; {C[1]} ];\nalpha_c = 0.0;\n", "calibration", "Bouguet"),
+    ("Kalibr's chain with tabs", "tabs.yaml", lambda _: kalibr().replace("  camera_model", "\tcamera_model"), "calibration", "tabs.yaml:2: begins with a tab"),
+    ("the same with a camera twice", "twice.yaml", lambda _: kalibr() + kalibr()[kalibr().index("cam1:"):], "calibration", "'cam1' is there twice, first in line"),
+    ("the same with a focal length as a share", "share.yaml", lambda _: kalibr().replace(str(F[0]), "0.610").replace(str(F[1]), "0.953"), "calibration", "intrinsics: focal lengths of 0.61 and 0.953 px"),
     ("OpenCV's calibration of one camera", "out_camera_data.xml", lambda _: "<?xml version=\"1.0\"?>\n<opencv_storage>\n<camera_matrix type_id=\"opencv-matrix\">\n<rows>3</rows><cols>3</cols><dt>d</dt><data>\n"
      f"{F[0]} 0. {C[0]} 0. {F[1]} {C[1]} 0. 0. 1.</data></camera_matrix>\n<distortion_coefficients type_id=\"opencv-matrix\"><rows>5</rows><cols>1</cols><dt>d</dt><data>0 0 0 0 0</data></distortion_coefficients>\n</opencv_storage>\n", "calibration", "OpenCV"),
     ("COLMAP's cameras.txt", "cameras.txt", lambda _: "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n# Number of cameras: 1\n1 OPENCV 752 480 458.6 457.3 367.2 248.4 -0.28 0.07 0.0002 0.00002\n", "calibration", "COLMAP"),
@@ -266,6 +276,8 @@ def main():
         recording = folder / "recording"
         made = run("simulate", "--seconds", 2, "--max-images", 3, "--out", recording, "--quiet")
         assert made.returncode == 0, made.stderr
+        chain_file = folder / "chain.yaml"
+        chain_file.write_text(kalibr(), encoding="utf-8")
         truth = folder / "truth.txt"
         truth.write_text(table("", poses(seconds), " "), encoding="utf-8")
         for number, (what, name, writer, use, expected) in enumerate(FILES):
@@ -293,6 +305,28 @@ def main():
         assert shown.returncode == 0, shown
         about = json.loads(shown.stdout)
         assert about["time_offset_s"] == -0.004, about
+        # A chain that contradicts itself is read, with a warning.
+        chain = kalibr()
+        at = chain.index("T_cn_cnm1")
+        (folder / "contradicts.yaml").write_text(chain[:at] + chain[at:].replace(str(T_C1C0[0][3]), "-0.2"), encoding="utf-8")
+        doubted = run("info", recording, "--calibration", folder / "contradicts.yaml")
+        assert doubted.returncode == 0 and "apart by the one, 0.1101 m by the other" in doubted.stderr, doubted
+        assert "contradicts" not in run("info", recording, "--calibration", chain_file).stderr
+        # Folders of other systems.
+        for make in (kimera, openvins):
+            place = folder / make.__name__
+            place.mkdir()
+            (place / "estimator_config.yaml").write_text(make(place), encoding="utf-8") if make is openvins else make(place)
+            assert "baseline 0.1101 m" in run("info", recording, "--calibration", place).stdout, make
+        # Lenses of camera_info, of which a folder has no places, and a bag without /tf_static neither.
+        pair = f"{folder / 'l.yaml'},{folder / 'r.yaml'}"
+        for side in "lr":
+            (folder / f"{side}.yaml").write_text(camera_info(None), encoding="utf-8")
+        refused = run("info", recording, "--calibration", pair)
+        assert refused.returncode == 2 and "camera_info file of ROS, without the camera's place" in refused.stderr, refused
+        (folder / "r.yaml").unlink()
+        refused = run("run", recording, "--calibration", pair, "--out", folder / "none")
+        assert refused.returncode == 2 and f"{folder / 'r.yaml'}: no such file" in refused.stderr, refused
         # A calibration that cannot be used is no success, whatever else is known of the recording.
         for kind, path in (("--calibration", folder / "truth.txt"), ("--imu-calibration", folder / "nothing.yaml")):
             refused = run("info", recording, kind, path)

@@ -57,7 +57,8 @@ const Refused kRefused[] = {
          for (std::size_t i = 2; i < l.size(); ++i) l[i] = l[1];
        });
      },
-     "/mav0/imu0/data.csv:3: the stamp was already there (220 of 221 rows are unusable)"},
+     "/mav0/imu0/data.csv:3: the stamp was already there (220 of 221 rows are unusable): 220 rows have the stamp of another: what arrives in a block needs a stamp for each, by "
+     "the sensor's own clock or its rate"},
     {"ImuFromTheEnd", [](Files& f) { edit(f, kImu, [](Lines& l) { std::reverse(l.begin() + 1, l.end()); }); },
      "/mav0/imu0/data.csv:3: the stamp is out of order (220 of 221 rows are unusable)"},
     {"ListWithoutNames",
@@ -139,7 +140,8 @@ const Refused kRefused[] = {
          for (std::size_t i = 1; i < l.size(); ++i) --l[i][1];
        });
      },
-     "/mav0/imu0/data.csv: stamps 1499999999.900000123 to 1500000001.000000123 s do not overlap the images' 1600000000.000000123 to 1600000000.950000123 s"},
+     "/mav0/imu0/data.csv: stamps 1499999999.900000123 to 1500000001.000000123 s do not overlap the images' 1600000000.000000123 to 1600000000.950000123 s: "
+     "the clocks are 100000000.100 s apart: stamp both by one clock"},
     {"RightOfAnotherDay",
      [](Files& f) {
        edit(f, kCam1, [](Lines& l) {

@@ -19,12 +19,14 @@ struct EvaluationOptions {
   Alignment alignment = Alignment::se3;
   RelativeErrorOptions per_metre{.unit = DeltaUnit::metres};
   RelativeErrorOptions per_second{.unit = DeltaUnit::seconds};
+  bool orientations = true;  ///< false: there are none, so that only absolute errors of positions are formed
 };
 
 struct Evaluation {
   int pairs = 0;
   double truth_path_m = 0;  ///< length of the truth between the pairs
   Similarity alignment;
+  bool orientations = true;  ///< as in the options: without, the errors but the next are empty
   ErrorStatistics absolute_m;
   ErrorStatistics absolute_rotation_deg;
   ErrorStatistics per_metre_m, per_metre_deg;
@@ -39,6 +41,9 @@ struct Evaluation {
 /// Trajectories of any frames. Relative errors are not formed across a gap of the truth. An error when no poses can be associated
 /// or they do not determine the alignment.
 Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options);
+
+/// Whether they are given: not where all of a trajectory that moves are that of no rotation, as of positions alone.
+bool has_orientations(const AnyTrajectory& trajectory);
 
 /// |p_estimate - p_truth| of each pair, m.
 std::vector<double> absolute_errors_m(const std::vector<PosePair>& pairs);

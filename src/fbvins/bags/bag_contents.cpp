@@ -16,6 +16,7 @@
 #include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/quoted.hpp"
@@ -201,11 +202,19 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
 
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics) {
   if (contents.rig.empty()) return std::nullopt;
-  for (std::size_t i = 0; i < topics.cameras.size(); ++i)
-    if (topics.cameras[i] != bag_camera_topic(static_cast<int>(i))) return std::nullopt;
   Result<StereoRig> rig = parse_rig(contents.rig, std::string(kRigTopic));
-  if (rig && std::cmp_less(rig->camera_count(), topics.cameras.size())) return std::nullopt;
-  return rig;
+  if (!rig) return rig;
+  std::vector<std::string> named = topics_in(contents.rig);
+  if (named.empty())
+    for (int i = 0; i < rig->camera_count(); ++i) named.push_back(bag_camera_topic(i));
+  std::vector<int> order;
+  for (const std::string& topic : topics.cameras) {
+    const auto number = static_cast<int>(std::ranges::find(named, topic) - named.begin());
+    if (number >= rig->camera_count()) return std::nullopt;
+    order.push_back(number);
+  }
+  if (std::ranges::is_sorted(order) && std::cmp_equal(order.back() + 1, order.size())) return rig;
+  return in_order(*rig, order);
 }
 
 Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topics, BagContents& contents) {
@@ -237,8 +246,13 @@ Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topi
   return {};
 }
 
-Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {
+Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics, const std::string& given) {
   const auto missing = [&](const std::string& what) {
+    if (!given.empty())
+      return Error{ErrorCode::not_found,
+                   fmt::format("{} has no place of the cameras on the IMU, nor has the bag ({}): record /tf_static, or give the "
+                               "lenses as Kalibr's chain with T_cam_imu",
+                               given, printable(what))};
     return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with --calibration", printable(what))};
   };
   for (const std::string& topic : topics.cameras)

@@ -88,8 +88,8 @@ std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const Chos
 /// the place of the second camera, it is that of the files' R and P.
 Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topics, BagContents& contents);
 /// From camera_info and transforms: K and D of raw images, R and P of topics that are called rectified. The error says what is
-/// missing.
-Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics);
+/// missing. `given`: the camera_info files of take_camera_info(), if there are any.
+Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics, const std::string& given = "");
 /// A sentence about the topics that are taken as rectified where that makes a difference; empty without.
 std::string rectified_topics(const BagContents& contents, const ChosenTopics& topics);
 /// Without those from number 2 on, which nobody has calibrated: colour cameras.

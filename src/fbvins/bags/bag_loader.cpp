@@ -24,9 +24,9 @@ std::pair<int, int> size_of(const DepthImage& image) { return {image.width, imag
 int BagLoader::find_used_bits(const std::vector<FrameEntry>& frames) {
   std::uint16_t largest = 0;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    if (cameras_[i].compressed) continue;
+    const Sensor& s = cameras_[i];
     for (const std::string& place : images_to_try(frames, [&](const FrameEntry& f) { return f.file(static_cast<int>(i)); }))
-      largest = std::max(largest, largest_value_of(bag_->read(place_of(place)), cameras_[i].encoding).value_or(0));
+      largest = std::max(largest, largest_value_of(bag_->read(place_of(place)), s.encoding, s.compressed).value_or(0));
   }
   return used_bits_ = bits_used_for(largest);
 }

@@ -140,7 +140,7 @@ Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compresse
     in.text();  // the format, which the bytes tell themselves
     const std::string_view file = in.bytes();
     if (!in.ok()) return Error{ErrorCode::malformed, "this is no compressed image"};
-    return decode_image(file);
+    return decode_image(file, used_bits);
   }
   RawImage raw = raw_image(in);
   if (!in.ok()) return Error{ErrorCode::malformed, "this is no image"};
@@ -173,9 +173,14 @@ std::string encoding_of(std::string_view bytes, Encoding encoding) {
   return fbvins::quoted(raw_image(in).encoding);
 }
 
-std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding) {
+std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding, bool compressed) {
   MessageFields in(bytes, encoding);
   in.header();
+  if (compressed) {
+    in.text();
+    const std::string_view file = in.bytes();
+    return in.ok() ? largest_value_of_png(file) : std::nullopt;
+  }
   const RawImage raw = raw_image(in);
   return in.ok() ? largest_value(raw) : std::nullopt;
 }

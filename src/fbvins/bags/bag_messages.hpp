@@ -29,8 +29,8 @@ Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compresse
 Result<DepthImage> depth_of(std::string_view bytes, Encoding encoding, bool compressed);
 /// As an uncompressed image names it, printable.
 std::string encoding_of(std::string_view bytes, Encoding encoding);
-/// The largest value of an uncompressed image of 16-bit values; none for any other.
-std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding);
+/// The largest value of an image of 16-bit values, of a compressed one of a PNG; none for any other.
+std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding, bool compressed);
 
 /// sensor_msgs/CameraInfo, and the frame it names. The camera is that of the images as they are recorded: binned, and cut out by
 /// the region of interest.

@@ -121,6 +121,20 @@ Result<StereoRig> load_euroc(const std::string& folder) {
   return with_depth(*rig, *depth);
 }
 
+Error several_files(const std::string& paths) {
+  std::vector<std::string_view> files;
+  split_at_commas(paths, files);
+  for (const std::string_view file : files) {
+    const Result<std::string> text = read_file(std::string(file), kLargestYaml_bytes);
+    if (!text) return text.error();
+    if (calibration_format(*text) != "camera_info")
+      return {ErrorCode::unsupported,
+              fmt::format("{}: several files are read of ROS's camera_info alone, which this is not", file)};
+    if (file.data() + file.size() == paths.data() + paths.size()) return camera_info_alone({std::string(files.front()), *text});
+  }
+  return {ErrorCode::not_found, paths + ": no such file"};
+}
+
 }  // namespace
 
 std::string calibration_format(const std::string& text) {
@@ -152,7 +166,12 @@ bool is_camera_info(const std::string& paths) {
 
 Result<StereoRig> load_calibration(const std::string& path, const std::string& imu_path) {
   std::error_code ignored;
+  if (fs::is_directory(path, ignored))
+    for (const char* known : {"LeftCameraParams.yaml", "estimator_config.yaml"})
+      if (fs::exists(fs::path(path) / known, ignored)) return load_calibration((fs::path(path) / known).string(), imu_path);
   if (fs::is_directory(path, ignored) || path.ends_with(".zip")) return with_imu(load_euroc(path), imu_path);
+  // Lenses alone, of which a bag may have the places.
+  if (path.find(',') != std::string::npos && !fs::exists(path, ignored)) return several_files(path);
   const Result<std::string> text = read_file(path, kLargestYaml_bytes);
   if (!text) return text.error();
   const std::string format = calibration_format(*text);

@@ -7,9 +7,9 @@
 #include <memory>
 
 #include "fbvins/bags/bag_stamps.hpp"
-#include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/topic_choice.hpp"
+#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/rig_text.hpp"
 
@@ -45,9 +45,9 @@ struct BagImages {
       for (std::size_t i = 0; i < images.size(); ++i)
         if (images[i].camera == static_cast<int>(camera)) own.push_back(i);
       const std::size_t step = std::max<std::size_t>(1, own.size() / kImagesForBits);
-      for (std::size_t i = 0; i < own.size() && !cameras[camera].compressed; i += step)
-        largest =
-            std::max(largest, largest_value_of(bag->read(place_of(images[own[i]].name)), cameras[camera].encoding).value_or(0));
+      const auto [encoding, compressed] = cameras[camera];
+      for (std::size_t i = 0; i < own.size(); i += step)
+        largest = std::max(largest, largest_value_of(bag->read(place_of(images[own[i]].name)), encoding, compressed).value_or(0));
     }
     used_bits = bits_used_for(largest);
   }

@@ -151,10 +151,4 @@ std::optional<std::uint16_t> largest_value(const RawImage& raw) {
   return largest;
 }
 
-int bits_used_for(std::uint16_t largest) {
-  for (const int bits : {8, 10, 12})
-    if (largest > 0 && largest < 1 << bits) return bits;
-  return 16;
-}
-
 }  // namespace fbvins

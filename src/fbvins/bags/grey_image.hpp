@@ -30,7 +30,4 @@ Result<Image> grey_image(const RawImage& raw);
 /// The largest value of an image of 16-bit values; none for other encodings and where grey_image() gives an error.
 std::optional<std::uint16_t> largest_value(const RawImage& raw);
 
-/// The bits that a camera uses whose largest value this is: 8, 10, 12 or, for anything larger, 16 (also where all is black).
-int bits_used_for(std::uint16_t largest);
-
 }  // namespace fbvins

@@ -14,19 +14,23 @@
 #include "fbvins/bags/bag_loader.hpp"
 #include "fbvins/bags/bag_stamps.hpp"
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/bags/given_calibration.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/options.hpp"
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_check.hpp"
+#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
@@ -112,7 +116,7 @@ class BagRecording {
       if (!named_) topics_.cameras = calibrated_cameras(contents_, topics_);
       if (!options_.calibration.empty())
         if (Result<void> taken = take_camera_info(options_.calibration, topics_, contents_); !taken) return taken;
-      const Result<StereoRig> rig = rig_of(contents_, topics_);
+      const Result<StereoRig> rig = rig_of(contents_, topics_, options_.calibration);
       if (!rig) return rig.error();
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
@@ -130,6 +134,8 @@ class BagRecording {
       rig_ = in_order(*rig_, order);
       out_.info.warnings.push_back(order_sentence(options_.calibration, order));
     }
+    if (!options_.calibration.empty())
+      for (std::string& doubt : chain_doubts(options_.calibration)) out_.info.warnings.push_back(std::move(doubt));
     std::vector<MountedCamera> cameras;
     for (std::size_t i = 0; i < topics_.cameras.size(); ++i) cameras.push_back(rig_->mounted(static_cast<int>(i)));
     out_.rig = *rig_;
@@ -181,8 +187,19 @@ class BagRecording {
     };
     if (topics_.cameras.size() > 1 && info.cameras[0].unpaired == info.cameras[0].listed) return never(topics_.cameras[1]);
     if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(topics_.depth);
-    if (!topics_.imu.empty()) out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);
+    if (Result<void> read = read_imu(); !read) return read;
     return read_aiding(contents_, topics_, out_);
+  }
+
+  Result<void> read_imu() {
+    if (topics_.imu.empty()) return {};
+    RowCounts& counts = out_.info.imu_rows;
+    out_.imu = readings_on(contents_, topics_.imu, topics_.accel, counts);
+    const std::string shared = shared_stamps(counts.rows, counts.duplicates);
+    if (2 * counts.duplicates > counts.rows)
+      return Error{ErrorCode::malformed, fmt::format("{}: of {} readings {}", topics_.imu, counts.rows, shared)};
+    if (!shared.empty()) out_.info.warnings.push_back(fmt::format("{}: {}", topics_.imu, shared));
+    return {};
   }
 
   Result<void> cut() {
@@ -192,7 +209,7 @@ class BagRecording {
     const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
     const Time first = frames.front().t + offset, last = frames.back().t + offset;
     if (!out_.imu.empty() && (out_.imu.back().t < first || out_.imu.front().t > last))
-      return Error{ErrorCode::malformed, fmt::format("the stamps on {} do not overlap the images'", topics_.imu)};
+      return no_overlap(topics_.imu, {out_.imu.front().t, out_.imu.back().t}, {first, last}, is_part(o));
     if (begins_later(o)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     if (begins_later(o)) std::erase_if(out_.aiding, [&](const AidingSample& r) { return stamp_of(r) < first - kImuLeadIn; });
     return {};
@@ -233,8 +250,7 @@ class BagRecording {
     if (!topics_.depth.empty()) depth = sensor(topics_.depth, out_.rig.depth_camera());
     auto loader = std::make_unique<BagLoader>(std::move(bag), path_, std::move(cameras), std::move(depth));
     if (const int bits = loader->find_used_bits(out_.frames); bits < 16)
-      out_.info.warnings.push_back(
-          fmt::format("{}: images of 16 bits have values of {} bits only, and are scaled by {}", path_, bits, 1 << (16 - bits)));
+      out_.info.warnings.push_back(used_bits_sentence(path_, bits));
     out_.loader = std::move(loader);
   }
 
@@ -260,49 +276,6 @@ bool is_flight_record(const std::string& path) {
   (void)reader->next();  // attachments are before the first message
   return std::any_of(reader->attachments().begin(), reader->attachments().end(),
                      [](const McapAttachment& a) { return a.name == kCalibrationAttachment; });
-}
-
-/// TUM-VI (vision.in.tum.de/data/datasets/visual-inertial-dataset): an EuRoC folder whose calibration is Kalibr's, in dso/.
-void find_tum_vi(const fs::path& folder, RecordingOptions& options) {
-  std::error_code ignored;
-  if (!options.calibration.empty() || fs::exists(folder / "mav0/cam0/sensor.yaml", ignored)) return;
-  for (const char* name : {"dso/camchain.yaml", "dso/camchain-imucam.yaml"})
-    if (fs::exists(folder / name, ignored)) options.calibration = (folder / name).string();
-  if (!options.calibration.empty() && options.imu_calibration.empty() && fs::exists(folder / "dso/imu_config.yaml", ignored))
-    options.imu_calibration = (folder / "dso/imu_config.yaml").string();
-}
-
-/// Of several IMUs in the file that one whose topic is used: by --topics, or as the bag has it alone.
-void choose_imu(const std::string& path, RecordingOptions& options) {
-  std::string& file = options.imu_calibration;
-  if (topics_of_imus(file).empty()) return;
-  std::vector<std::string> recorded = options.topics;
-  if (const auto bag = open_bag(path); bag && imu_of_topics(file, recorded) == file) {
-    (*bag)->only({}, {5'000'000'000});
-    while ((*bag)->next()) continue;
-    for (const BagTopic& topic : (*bag)->topics())
-      if (topic.type == "sensor_msgs/Imu") recorded.push_back(topic.name);
-  }
-  file = imu_of_topics(file, recorded);
-}
-
-/// Puts the calibration that is given with a recording into its options. Kalibr's is left to the recording's reader, which has
-/// noise figures to go with it.
-Result<void> take_calibration(bool bag, RecordingOptions& options) {
-  if (options.calibration.empty()) {
-    options.dataset.kalibr_imu = options.imu_calibration;  // with the recording's own cameras
-    return {};
-  }
-  if (bag && is_camera_info(options.calibration)) {  // with the places that the bag has
-    options.dataset.kalibr_imu = options.imu_calibration;
-    return {};
-  }
-  const Result<StereoRig> rig = load_calibration(options.calibration, options.imu_calibration);
-  if (!rig) return rig.error();
-  if (bag || !is_kalibr(options.calibration)) return options.dataset.rig = *rig, Result<void>{};
-  options.dataset.kalibr_camchain = options.calibration;
-  options.dataset.kalibr_imu = options.imu_calibration;
-  return {};
 }
 
 }  // namespace

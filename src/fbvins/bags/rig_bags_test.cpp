@@ -236,6 +236,12 @@ TEST(RigTopics, CamerasThatNobodyHasCalibratedAreLeftOut) {
   const auto rig = rig_of(contents, *topics);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->T_BC(2).p.y(), 0.1 * 3);
+  contents.transforms.clear();
+  EXPECT_EQ(rig_of(contents, *topics).error().message,
+            "holds no calibration (no transform from 'frame0' to 'imu'): give one with --calibration");
+  EXPECT_EQ(rig_of(contents, *topics, "l.yaml,r.yaml").error().message,
+            "l.yaml,r.yaml has no place of the cameras on the IMU, nor has the bag (no transform from 'frame0' to 'imu'): record "
+            "/tf_static, or give the lenses as Kalibr's chain with T_cam_imu");
 }
 
 TEST(RigTopics, RectifiedImagesAreThoseOfRAndP) {

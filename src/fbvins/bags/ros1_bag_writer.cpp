@@ -63,6 +63,17 @@ struct Ros1BagWriter::State {
   Duration time_offset;
   AidingSensors aiding;
 
+  /// Of the images, where some have other names than usual; else empty.
+  std::vector<std::string> renamed_images(int cameras) const {
+    std::vector<std::string> out;
+    bool renamed = false;
+    for (int i = 0; i < cameras; ++i) {
+      out.push_back(all[ros1::image_number(i)].name);
+      renamed |= out.back() != bag_camera_topic(i);
+    }
+    return renamed ? out : std::vector<std::string>{};
+  }
+
   Result<void> rename(const std::map<std::string, std::string>& names) {
     for (const auto& [before, after] : names) {
       const auto topic = std::ranges::find(all, before, &ros1::Topic::name);
@@ -180,7 +191,7 @@ Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const Stere
   if (rig.depth && rig.depth->own)
     messages.emplace_back(ros1::kDepthInfo, ros1::camera_message(start, kDepthFrame, rig.depth->own->camera));
   messages.emplace_back(ros1::kTransforms, ros1::transforms_message(start, rig));
-  messages.emplace_back(ros1::kRig, ros1::text_message(rig_to_yaml(rig)));
+  messages.emplace_back(ros1::kRig, ros1::text_message(rig_to_yaml(rig, state->renamed_images(rig.camera_count()))));
   for (const auto& [number, message] : messages)
     if (Result<void> done = state->add(number, start, message); !done) return done.error();
   return Ros1BagWriter(std::move(state));

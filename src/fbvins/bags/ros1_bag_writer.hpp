@@ -12,14 +12,14 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/rig_text.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
 
-inline constexpr std::string_view kRigTopic = "/fbvins/calibration", kBagTruthTopic = "/ground_truth",
-                                  kBagOdometryTopic = "/odometry";
-/// The image topics that the calibration on kRigTopic is of: "/cam0/image_raw".
+inline constexpr std::string_view kBagTruthTopic = "/ground_truth", kBagOdometryTopic = "/odometry";
+/// The image topics that the calibration on kRigTopic is of where its text names none: "/cam0/image_raw".
 std::string bag_camera_topic(int camera);
 inline constexpr std::string_view kBagDepthTopic = "/depth0/image_raw";
 

@@ -11,6 +11,7 @@
 
 #include "fbvins/io/aiding_messages.hpp"
 #include "fbvins/io/quoted.hpp"
+#include "fbvins/io/rig_text.hpp"
 
 namespace fbvins {
 namespace {
@@ -101,6 +102,13 @@ Result<std::vector<std::string>> find_rig(const BagContents& contents) {
     return ask(fmt::format("has {} stereo pairs", pairs.size()), each, "are the cameras'");
   }
   return with_further(pairs.front(), all);
+}
+
+/// Those that a calibration of ours names, as far as there are images of them.
+std::vector<std::string> own_cameras(const BagContents& contents) {
+  std::vector<std::string> out = contents.rig.empty() ? std::vector<std::string>{} : topics_in(contents.rig);
+  std::erase_if(out, [&](const std::string& topic) { return !contents.images.contains(topic); });
+  return out;
 }
 
 Result<std::string> find_imu(const BagContents& contents) {
@@ -203,7 +211,8 @@ Result<ChosenTopics> choose_topics(const BagContents& contents, const std::vecto
   Result<ChosenTopics> out = sorted_by_kind(contents, named);
   if (!out) return out;
   if (out->cameras.empty()) {
-    Result<std::vector<std::string>> found = find_rig(contents);
+    Result<std::vector<std::string>> found = own_cameras(contents);
+    if (found->empty()) found = find_rig(contents);
     if (!found) return found.error();
     out->cameras = *std::move(found);
     out->cameras.resize(std::min(out->cameras.size(), static_cast<std::size_t>(wanted.most_cameras)));

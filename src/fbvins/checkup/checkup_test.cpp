@@ -101,6 +101,25 @@ TEST(Checkup, UnitsTooCloseToBeDistinguishedAreBothNamed) {
   EXPECT_EQ(advice(1 / 0.3048), "it looks like feet/s^2: multiply the accelerometer's readings by 0.3048");
 }
 
+TEST(Checkup, TellsALateImuFromAnotherClock) {
+  const auto found = [](double first_image_s, double last_image_s, double first_reading_s, double last_reading_s) {
+    const auto at = [](double s) { return Time{Duration::from_seconds(1000 + s).ns}; };
+    const auto finding = check_ends({at(first_image_s), at(last_image_s), at(first_reading_s), at(last_reading_s)}, rig());
+    return finding ? std::string(to_string(finding->kind)) + ": " + finding->measured : std::string();
+  };
+  EXPECT_EQ(found(0, 10, -0.3, 10.2), "");
+  EXPECT_EQ(found(0, 10, -1, 9.3), "imu_gaps: the readings end 0.700 s before the last image");
+  EXPECT_EQ(found(0, 17, 3.5, 17.2), "imu_gaps: the readings begin 3.500 s after the first image");
+  EXPECT_EQ(found(0, 5, 3.5, 5), "imu_gaps: the readings begin 3.500 s after the first image");
+  EXPECT_EQ(
+      found(0, 17, 2.5, 20.2),
+      "clocks_apart: the readings begin 2.500 s after the first image and end 3.200 s after the last image, as if one clock "
+      "were set otherwise");
+  EXPECT_EQ(found(0, 17, -3.5, 14.2).substr(0, 12), "clocks_apart");
+  EXPECT_EQ(found(0, 10, 18000, 18010).substr(0, 12), "clocks_apart");
+  EXPECT_EQ(found(0, 10, -900, -890).substr(0, 12), "clocks_apart");
+}
+
 TEST(Checkup, NamesWrongStamps) {
   auto twice = readings(), elsewhere = readings();
   for (std::size_t i = 1; i < twice.size(); i += 2)
@@ -108,6 +127,9 @@ TEST(Checkup, NamesWrongStamps) {
   EXPECT_TRUE(says(check_stamps(twice, stamps(), rig()), FindingKind::imu_stamps));
   for (ImuSample& sample : elsewhere) sample.t = sample.t + Duration{100'000'000'000};
   EXPECT_TRUE(says(check_stamps(elsewhere, stamps(), rig()), FindingKind::clocks_apart));
+  auto shifted = readings();
+  for (ImuSample& sample : shifted) sample.t = sample.t + Duration{1'500'000'000};
+  EXPECT_TRUE(says(check_stamps(shifted, stamps(), rig()), FindingKind::clocks_apart));
   auto irregular = stamps();
   for (std::size_t i = 0; i < irregular.size(); i += 3) irregular[i] = irregular[i] + Duration{12'000'000};
   EXPECT_TRUE(says(check_stamps(readings(), irregular, rig()), FindingKind::image_stamps));

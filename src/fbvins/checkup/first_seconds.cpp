@@ -37,7 +37,7 @@ bool FirstSeconds::is_over() const { return !images_.empty() && (images_.back() 
 
 std::vector<Finding> FirstSeconds::findings() const {
   std::vector<Finding> findings = check_reading_units(samples_);
-  for (Finding& finding : check_stamps(samples_, images_, rig_)) findings.push_back(std::move(finding));
+  for (Finding& finding : check_stamps(samples_, images_, rig_, ends_)) findings.push_back(std::move(finding));
   if (auto finding = check_noise_figures(rig_.imu_noise)) findings.push_back(std::move(*finding));
   if (auto finding = check_dots(share_of_dots(rig_.left(), kept_))) findings.push_back(std::move(*finding));
   if (!rig_.has_right()) return findings;

@@ -40,6 +40,9 @@ constexpr double kLongestReadingGap_s = 0.05, kMostReadingsMissing = 0.02;
 constexpr double kLongestImageGap_s = 0.5, kMostImagesMissing = 0.05;
 /// Images before the first reading or after the last one, for so long.
 constexpr double kLongestWithoutReadings_s = 0.5;
+/// An IMU that is switched on and off with the cameras begins and ends within so much of them: what lies as far off at both ends,
+/// to this, is the clock.
+constexpr double kSameShift_s = 1.0;
 
 struct Gaps {
   int count = 0;
@@ -245,41 +248,44 @@ void check_images(std::span<const Time> images, std::vector<Finding>& findings) 
   findings.push_back(std::move(finding));
 }
 
-void check_clocks(std::span<const ImuSample> samples, std::span<const Time> images, const StereoRig& rig,
-                  std::vector<Finding>& findings) {
-  const Duration offset = Duration::from_seconds(rig.time_offset_s);
-  const auto covered = std::count_if(images.begin(), images.end(),
-                                     [&](Time t) { return t + offset >= samples.front().t && t + offset <= samples.back().t; });
-  if (2 * static_cast<std::size_t>(covered) >= images.size()) {
-    const double before_s = (samples.front().t - images.front() - offset).seconds();
-    const double after_s = (images.back() + offset - samples.back().t).seconds();
-    if (std::max(before_s, after_s) < kLongestWithoutReadings_s) return;
-    Finding finding = gap_of(FindingKind::imu_gaps, std::max(before_s, after_s));
-    finding.measured = before_s > after_s ? fmt::format("the readings begin {:.3f} s after the first image", before_s)
-                                          : fmt::format("the readings end {:.3f} s before the last image", after_s);
-    finding.expected = "there are readings for every image";
-    finding.advice = "record the IMU for as long as the cameras";
-    findings.push_back(std::move(finding));
-    return;
-  }
-  Finding finding;
-  finding.kind = FindingKind::clocks_apart;
-  finding.size = (samples.front().t - images.front()).seconds(), finding.unit = "s";
-  finding.measured = fmt::format(
-      "{} of {} images are at times at which there are IMU readings; the first reading is stamped {:.3f} s after the first image",
-      covered, images.size(), finding.size);
-  finding.expected = "cameras and IMU have the same clock";
-  finding.advice = "stamp both by one clock";
-  findings.push_back(std::move(finding));
-}
-
 }  // namespace
 
-std::vector<Finding> check_stamps(std::span<const ImuSample> samples, std::span<const Time> images, const StereoRig& rig) {
+std::optional<Finding> check_ends(const StampEnds& ends, const StereoRig& rig) {
+  const Duration offset = Duration::from_seconds(rig.time_offset_s);
+  const double begin_s = (ends.first_reading - ends.first_image - offset).seconds();
+  const double end_s = (ends.last_reading - ends.last_image - offset).seconds();
+  const bool never = ends.first_reading > ends.last_image + offset || ends.last_reading < ends.first_image + offset;
+  // Recordings that are begun in the middle have a second of readings before it.
+  const bool shifted = std::min(begin_s, end_s) > kLongestWithoutReadings_s ||
+                       std::max(begin_s, end_s) < -kLongestWithoutReadings_s - kSameShift_s;
+  const auto placed = [](double s, const char* what) {
+    return fmt::format("{:.3f} s {} the {} image", std::abs(s), s > 0 ? "after" : "before", what);
+  };
+  if (never || (shifted && std::abs(begin_s - end_s) < kSameShift_s)) {
+    Finding finding = gap_of(FindingKind::clocks_apart, begin_s);
+    finding.measured = fmt::format("the readings begin {} and end {}{}", placed(begin_s, "first"), placed(end_s, "last"),
+                                   never ? ": no image lies between them" : ", as if one clock were set otherwise");
+    finding.expected = "cameras and IMU have the same clock";
+    finding.advice = "stamp both by one clock";
+    return finding;
+  }
+  if (std::max(begin_s, -end_s) < kLongestWithoutReadings_s) return std::nullopt;
+  Finding finding = gap_of(FindingKind::imu_gaps, std::max(begin_s, -end_s));
+  finding.measured =
+      begin_s > -end_s ? "the readings begin " + placed(begin_s, "first") : "the readings end " + placed(end_s, "last");
+  finding.expected = "there are readings for every image";
+  finding.advice = "record the IMU for as long as the cameras";
+  return finding;
+}
+
+std::vector<Finding> check_stamps(std::span<const ImuSample> samples, std::span<const Time> images, const StereoRig& rig,
+                                  const std::optional<StampEnds>& ends) {
   std::vector<Finding> findings;
   if (samples.size() >= kFewestStamps) check_readings(samples, rig, findings);
   if (images.size() >= kFewestStamps) check_images(images, findings);
-  if (!samples.empty() && images.size() >= 2) check_clocks(samples, images, rig, findings);
+  if (samples.empty() || images.size() < 2) return findings;
+  const StampEnds seen{images.front(), images.back(), samples.front().t, samples.back().t};
+  if (auto finding = check_ends(ends.value_or(seen), rig)) findings.push_back(*std::move(finding));
   return findings;
 }
 

@@ -58,7 +58,9 @@ double gravity_turns_off(const ImuSeries& imu) {
 
 void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
-  if (has(FindingKind::clocks_apart)) return;
+  const std::vector<ImuSample>& readings = evidence_.imu;
+  const std::vector<Time>& stamps = evidence_.stamps;
+  if (readings.empty() || stamps.empty() || readings.front().t > stamps.back() || readings.back().t < stamps.front()) return;
   if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
     turns_seen_ = true;
     not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");

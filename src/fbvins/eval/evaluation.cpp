@@ -85,7 +85,27 @@ RelativeErrors relative_errors_of(const std::vector<std::vector<PosePair>>& part
   return out;
 }
 
+/// Relative errors of positions are those along the body's axes, and so need orientations, too.
+void add_errors_of_orientations(const std::vector<PosePair>& pairs, const std::vector<std::vector<PosePair>>& parts,
+                                const EvaluationOptions& options, Evaluation& e) {
+  e.absolute_rotation_deg = statistics_of(absolute_errors_deg(pairs));
+  RelativeErrors metre = relative_errors_of(parts, options.per_metre);
+  e.per_metre_m = statistics_of(std::move(metre.translation_m));
+  e.per_metre_deg = statistics_of(std::move(metre.rotation_deg));
+  RelativeErrors second = relative_errors_of(parts, options.per_second);
+  e.per_second_m = statistics_of(std::move(second.translation_m));
+  e.per_second_deg = statistics_of(std::move(second.rotation_deg));
+}
+
 }  // namespace
+
+bool has_orientations(const AnyTrajectory& trajectory) {
+  constexpr double kMoves_m = 0.1;
+  const auto& poses = trajectory.poses;
+  if (poses.empty()) return true;
+  const bool none = std::ranges::all_of(poses, [](const auto& pose) { return pose.T.q.vec().isZero(0); });
+  return !none || std::ranges::none_of(poses, [&](const auto& pose) { return (pose.T.p - poses.front().T.p).norm() > kMoves_m; });
+}
 
 Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options) {
   if (estimate.poses.empty()) return Error{ErrorCode::invalid_argument, "there is no estimated pose"};
@@ -107,13 +127,8 @@ Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& est
   pairs = apply(*alignment, std::move(pairs));
   const std::vector<std::vector<PosePair>> parts = between_gaps(pairs, gap_s);
   e.absolute_m = statistics_of(absolute_errors_m(pairs));
-  e.absolute_rotation_deg = statistics_of(absolute_errors_deg(pairs));
-  RelativeErrors metre = relative_errors_of(parts, options.per_metre);
-  e.per_metre_m = statistics_of(std::move(metre.translation_m));
-  e.per_metre_deg = statistics_of(std::move(metre.rotation_deg));
-  RelativeErrors second = relative_errors_of(parts, options.per_second);
-  e.per_second_m = statistics_of(std::move(second.translation_m));
-  e.per_second_deg = statistics_of(std::move(second.rotation_deg));
+  e.orientations = options.orientations;
+  if (options.orientations) add_errors_of_orientations(pairs, parts, options, e);
   for (const std::vector<PosePair>& part : parts)
     for (std::size_t i = 1; i < part.size(); ++i) e.truth_path_m += (part[i].truth.T.p - part[i - 1].truth.T.p).norm();
   for (const PosePair& pair : pairs)

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "fbvins/eval/alignment.hpp"
+#include "fbvins/eval/evaluation.hpp"
 
 namespace fbvins {
 namespace {
@@ -48,7 +49,8 @@ Misreading find_misreading(const AnyTrajectory& truth, const AnyTrajectory& esti
   const std::vector<PosePair> pairs = associate(truth, estimate, options);
   if (pairs.size() < kFewestPairs) return out;
   constexpr double kWrong_deg = 15, kExplained = 0.2;
-  const double as_read_deg = off_deg(pairs, nullptr);
+  const bool oriented = has_orientations(truth) && has_orientations(estimate);
+  const double as_read_deg = oriented ? off_deg(pairs, nullptr) : 0;
   const Variant* best = nullptr;
   double best_deg = kExplained * as_read_deg;
   for (const Variant& variant : kVariants)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: what of a calibration is possible and hardly true. A pure function, any thread.
+// Private: what of a calibration is possible and hardly true. Any thread.
 #pragma once
 
 #include <string>
@@ -11,5 +11,8 @@ namespace fbvins {
 
 /// A sentence each: time offsets and line delays as of another unit, noise figures as of another unit, or of the other sensor.
 std::vector<std::string> calibration_doubts(const StereoRig& rig);
+
+/// Of a Kalibr chain: where a camera's T_cn_cnm1 is not that of T_cam_imu, which is used. Empty where the file cannot be read.
+std::vector<std::string> chain_doubts(const std::string& camchain_path);
 
 }  // namespace fbvins

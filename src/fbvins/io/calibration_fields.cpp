@@ -38,6 +38,18 @@ std::optional<std::size_t> numbers_before_focal(const std::string& model) {
 }
 
 /// What is wrong with the intrinsics of a camera that no lens has; empty where they are plausible.
+std::string implausible_focal_length(const Camera& camera) {
+  constexpr double kFewestWidths = 0.05, kMostWidths = 20;  // in widths of the image: the widest fisheye, a telescope
+  const auto [fx, fy, cx, cy] = camera.intrinsics();
+  const double width = camera.width();
+  if (std::min(fx, fy) >= kFewestWidths * width && std::max(fx, fy) <= kMostWidths * width) return "";
+  return fmt::format(
+      "focal lengths of {:g} and {:g} px are none of images of {} x {}: are they in millimetres, or a share of the "
+      "image's size?",
+      fx, fy, camera.width(), camera.height());
+}
+
+/// The same of its principal point.
 std::string implausible_centre(const Camera& camera) {
   const auto [fx, fy, cx, cy] = camera.intrinsics();
   const double x = 2 * cx / camera.width(), y = 2 * cy / camera.height();  // 1 in the middle
@@ -152,7 +164,8 @@ CameraTimes read_camera_times(YamlReader& yaml, const YAML::Node& map, double of
 Camera read_real_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read) {
   Camera camera = read_camera(yaml, map, coefficients_field, read);
   if (!yaml.ok()) return camera;
-  if (const std::string problem = implausible_centre(camera); !problem.empty()) yaml.complain(map, "intrinsics", problem);
+  if (const std::string focal = implausible_focal_length(camera); !focal.empty()) yaml.complain(map, "intrinsics", focal);
+  else if (const std::string problem = implausible_centre(camera); !problem.empty()) yaml.complain(map, "intrinsics", problem);
   else if (const std::string distorted = implausible_distortion(camera); !distorted.empty())
     yaml.complain(map, coefficients_field, distorted);
   return camera;

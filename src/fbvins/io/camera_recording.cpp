@@ -35,15 +35,26 @@ class EurocCameras {
     if (sensors.imu)
       if (Result<void> done = take_imu(std::move(rows->imu.rows)); !done) return done.error();
     sort_by_time(out_.images);
-    out_.take = [files = files_, images = out_.images](std::size_t index) -> CameraRecording::Decode {
+    out_.take = [files = files_, images = out_.images, bits = used_bits()](std::size_t index) -> CameraRecording::Decode {
       Result<std::string> bytes = files->read(images[index].name, kLargestFile_bytes);
       if (!bytes) return [error = bytes.error()]() -> Result<Image> { return error; };
-      return [bytes = *std::move(bytes)] { return decode_image(bytes); };
+      return [bytes = *std::move(bytes), bits] { return decode_image(bytes, bits); };
     };
     return std::move(out_);
   }
 
  private:
+  /// Of images of 16 bits, from some spread over the recording.
+  int used_bits() const {
+    constexpr std::size_t kTried = 16;
+    std::uint16_t largest = 0;
+    const std::size_t step = std::max<std::size_t>(1, out_.images.size() / kTried);
+    for (std::size_t i = 0; i < out_.images.size(); i += step)
+      if (const Result<std::string> bytes = files_->read(out_.images[i].name, kLargestFile_bytes); bytes)
+        largest = std::max(largest, largest_value_of_png(*bytes).value_or(0));
+    return bits_used_for(largest);
+  }
+
   void list_camera(int camera, const std::string& folder, const std::vector<ImageRow>& rows) {
     for (const ImageRow& row : rows) out_.images.push_back({row.t, camera, root_ + folder + "data/" + row.file});
     out_.cameras.push_back(fmt::format("cam{}", camera));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
@@ -11,7 +12,7 @@ namespace {
 
 bool looks_like_header(std::string_view line) {
   const char c = line.front();
-  const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '"';
+  const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '"' || c == '%';
   return letter && !parse_double(line.substr(0, line.find_first_of(", \t")));  // "nan,..." is a bad row
 }
 
@@ -35,6 +36,16 @@ std::vector<CsvLine> data_lines(std::string_view text) {
   std::erase_if(lines, [](const CsvLine& line) { return line.text.front() == '#'; });
   if (!lines.empty() && looks_like_header(lines.front().text)) lines.erase(lines.begin());
   return lines;
+}
+
+std::string columns_sentence(std::string_view row, std::size_t columns, std::string_view wanted) {
+  const char* instead = columns > 1                                     ? nullptr
+                        : row.find(';') != std::string_view::npos       ? "semicolons"
+                        : row.find('\t') != std::string_view::npos      ? "tabs"
+                        : trim(row).find(' ') != std::string_view::npos ? "blanks"
+                                                                        : nullptr;
+  const std::string why = instead != nullptr ? fmt::format(": they are between {}, and commas are needed", instead) : "";
+  return fmt::format("{} columns where {} are needed{}", columns, wanted, why);
 }
 
 void split_at_commas(std::string_view line, std::vector<std::string_view>& fields) { split_at(',', line, fields); }
@@ -92,10 +103,10 @@ std::vector<bool> longest_increasing(const std::vector<Time>& stamps) {
 
 Result<void> judge(const RowCounts& counts, const std::string& file) {
   if (counts.rows == 0) return Error{ErrorCode::malformed, fmt::format("{}: there are no data rows in it", file)};
-  if (2 * counts.bad() > counts.rows)
-    return Error{ErrorCode::malformed,
-                 fmt::format("{} ({} of {} rows are unusable)", counts.first_bad, counts.bad(), counts.rows)};
-  return {};
+  if (2 * counts.bad() <= counts.rows) return {};
+  const std::string shared = shared_stamps(counts.rows, counts.duplicates);
+  return Error{ErrorCode::malformed, fmt::format("{} ({} of {} rows are unusable){}{}", counts.first_bad, counts.bad(),
+                                                 counts.rows, shared.empty() ? "" : ": ", shared)};
 }
 
 }  // namespace fbvins

@@ -44,6 +44,9 @@ std::vector<CsvLine> lines_of(std::string_view text);
 /// Those of them that hold data: no comments, no header.
 std::vector<CsvLine> data_lines(std::string_view text);
 
+/// "N columns where WANTED are needed", and which separator the row has instead of commas.
+std::string columns_sentence(std::string_view row, std::size_t columns, std::string_view wanted);
+
 /// Splits at commas, or at another separator; outer blanks removed. The vector is reused from row to row.
 void split_at_commas(std::string_view line, std::vector<std::string_view>& fields);
 void split_at(char separator, std::string_view line, std::vector<std::string_view>& fields);

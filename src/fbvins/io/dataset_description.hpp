@@ -24,5 +24,9 @@ Result<void> cut_frames(const DatasetOptions& options, std::vector<FrameEntry>& 
 
 /// Whether readings before the first frame kept belong to a part that is left out.
 inline bool begins_later(const DatasetOptions& options) { return options.skip_frames > 0 || options.start_s > 0; }
+/// Whether frames at either end are left out.
+inline bool is_part(const DatasetOptions& options) {
+  return begins_later(options) || options.duration_s > 0 || options.max_frames > 0;
+}
 
 }  // namespace fbvins

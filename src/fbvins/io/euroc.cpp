@@ -9,6 +9,7 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/aiding_folders.hpp"
 #include "fbvins/io/calibration.hpp"
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/camera_order.hpp"
 #include "fbvins/io/dataset_description.hpp"
@@ -19,7 +20,7 @@
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/kalibr_imu.hpp"
-#include "fbvins/io/numbers.hpp"
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
@@ -44,7 +45,7 @@ class EurocReader {
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
-    out_.loader = make_euroc_loader(std::move(files_), root_, folders(), out_.rig);
+    out_.loader = make_euroc_loader(std::move(files_), root_, folders(), out_.rig, out_.frames, out_.info);
     return std::move(out_);
   }
 
@@ -149,6 +150,7 @@ class EurocReader {
     const auto& path = options_.kalibr_imu;
     Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path), imu.noise);
     if (!rig) return rig.error();
+    for (std::string& doubt : chain_doubts(options_.kalibr_camchain)) warn(std::move(doubt));
     const std::vector<std::string> rostopics = rostopics_of(options_.kalibr_camchain);
     std::vector<std::string> folders;
     for (int i = 0; i < rig->camera_count(); ++i) folders.push_back(fmt::format("cam{}", i));
@@ -254,10 +256,7 @@ class EurocReader {
     const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
     const Time first = out_.frames.front().t + offset, last = out_.frames.back().t + offset;
     if (out_.imu.back().t < first || out_.imu.front().t > last)
-      return Error{ErrorCode::malformed,
-                   fmt::format("{}: stamps {} to {} s do not overlap the images' {} to {} s", named("imu0/data.csv"),
-                               format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t), format_seconds(first),
-                               format_seconds(last))};
+      return no_overlap(named("imu0/data.csv"), {out_.imu.front().t, out_.imu.back().t}, {first, last}, is_part(options_));
     if (begins_later(options_)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     return {};
   }

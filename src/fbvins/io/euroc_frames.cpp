@@ -7,20 +7,24 @@
 #include <iterator>
 
 #include "fbvins/core/median.hpp"
-#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/numbers.hpp"
-#include "fbvins/io/side_by_side.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargestImage_bytes = std::uint64_t{64} << 20u;
 constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above the range of any sensor
 
 /// File names stay below the camera's folder.
 bool is_harmless_name(std::string_view name) {
   return !name.empty() && name.front() != '/' && name.find("..") == std::string_view::npos &&
          name.find('\0') == std::string_view::npos;
+}
+
+/// The name in the camera's folder `data`, which some writers name as well: data/1.png, mav0/cam0/data/1.png.
+std::string_view below_data(std::string_view name) {
+  constexpr std::string_view kData = "data/";
+  const std::size_t at = name.rfind(kData);
+  return at == std::string_view::npos || (at > 0 && name[at - 1] != '/') ? name : name.substr(at + kData.size());
 }
 
 RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
@@ -31,72 +35,6 @@ RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
   problem = fmt::format("'{}' is not a stamp in nanoseconds", field.substr(0, 40));
   return RowVerdict::malformed;
 }
-
-template <int kCamera>
-Result<Image> decode_half(std::string_view bytes) {
-  Result<Image> both = decode_image(bytes);
-  return both ? Result<Image>(half_of(*both, kCamera)) : both;
-}
-
-int width_of(const Image& image) { return image.width(); }
-int height_of(const Image& image) { return image.height(); }
-int width_of(const DepthImage& image) { return image.width; }
-int height_of(const DepthImage& image) { return image.height; }
-
-class EurocLoader : public FrameLoader {
- public:
-  EurocLoader(std::unique_ptr<FileSource> files, std::string root, std::vector<std::string> folders, const StereoRig& rig)
-      : files_(std::move(files)), root_(std::move(root)), folders_(std::move(folders)), rig_(rig) {}
-
-  LoadedFrame load(const FrameEntry& entry) override {
-    LoadedFrame out;
-    out.frame.t = entry.t;
-    out.frame.offsets = entry.offsets;
-    for (int i = 0; i < static_cast<int>(entry.files.size()); ++i)
-      out.frame.images.push_back(load_image(entry.file(i), i, out.of(i), out));
-    out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.depth_camera(), out.depth, out);
-    return out;
-  }
-
- private:
-  std::shared_ptr<const Image> load_image(const std::string& file, int camera, ImageCounts& counts, LoadedFrame& out) const {
-    if (file.empty()) return nullptr;
-    const bool side_by_side = folders_.size() == 2 && folders_[0] == folders_[1];
-    const auto decode = !side_by_side ? decode_image : camera == 0 ? decode_half<0> : decode_half<1>;
-    return load<Image>(file, folders_[static_cast<std::size_t>(camera)], decode, rig_.camera(camera), counts, out);
-  }
-
-  template <class T>
-  std::shared_ptr<const T> load(const std::string& file, std::string_view folder, Result<T> (*decode)(std::string_view),
-                                const Camera& camera, ImageCounts& counts, LoadedFrame& out) const {
-    if (file.empty()) return nullptr;
-    std::string& problem = out.problem;
-    const std::string path = fmt::format("{}{}data/{}", root_, folder, file);
-    const auto blame = [&](const std::string& sentence) {
-      if (problem.empty()) problem = fmt::format("{}: {}", files_->describe(path), sentence);
-    };
-    Result<std::string> bytes = files_->read(path, kLargestImage_bytes);
-    Result<T> image = bytes ? decode(*bytes) : Result<T>(bytes.error());
-    if (!image) {
-      ++counts.corrupt;
-      if (bytes) blame(image.error().message);
-      else if (problem.empty()) problem = image.error().message;
-      return nullptr;
-    }
-    if (const auto sentence = wrong_size(width_of(*image), height_of(*image), camera)) {
-      ++counts.wrong_size;
-      out.other_size = ImageSize{width_of(*image), height_of(*image)};
-      blame(*sentence);
-      return nullptr;
-    }
-    return std::make_shared<const T>(*std::move(image));
-  }
-
-  std::unique_ptr<FileSource> files_;
-  std::string root_;
-  std::vector<std::string> folders_;
-  StereoRig rig_;
-};
 
 std::vector<Time> stamps_of(const std::vector<FrameEntry>& frames) {
   std::vector<Time> stamps;
@@ -184,14 +122,14 @@ ParsedRows<ImageRow> parse_image_rows(std::string_view csv, const std::string& f
   return parse_stamped_lines<ImageRow>(data_lines(csv), file, [&](std::string_view line, ImageRow& row, std::string& problem) {
     split_at_commas(line, fields);
     if (fields.size() != 2) {
-      problem = fmt::format("{} columns where 2 are needed", fields.size());
+      problem = columns_sentence(line, fields.size(), "2");
       return RowVerdict::malformed;
     }
     if (!is_harmless_name(fields[1])) {
       problem = fmt::format("'{}' is not the name of an image file", fields[1].substr(0, 40));
       return RowVerdict::malformed;
     }
-    row.file = fields[1];
+    row.file = below_data(fields[1]);
     return parse_stamp(fields[0], row.t, problem);
   });
 }
@@ -199,7 +137,7 @@ ParsedRows<ImageRow> parse_image_rows(std::string_view csv, const std::string& f
 RowVerdict ImuRowParser::operator()(std::string_view line, ImuSample& sample, std::string& problem) {
   split_at_commas(line, fields_);
   if (fields_.size() != 7) {
-    problem = fmt::format("{} columns where 7 are needed", fields_.size());
+    problem = columns_sentence(line, fields_.size(), "7");
     return RowVerdict::malformed;
   }
   if (const RowVerdict stamp = parse_stamp(fields_[0], sample.t, problem); stamp != RowVerdict::good) return stamp;
@@ -243,7 +181,7 @@ std::string untriggered_sentence(const std::vector<FrameEntry>& frames, int came
     if (const Duration offset = frame.offsets.of(camera); offset.ns != 0) offsets_ms.push_back(1e3 * offset.seconds());
   return fmt::format(
       "cameras 0 and {} have no common trigger: by stamps and time offsets their images are more than {} ms apart, {:.1f} ms in "
-      "the median, and count as taken then",
+      "the median, and count as taken then; of images that were taken at once, and only stamped apart, --pair-tolerance says so",
       camera, tolerance_ms, median(offsets_ms));
 }
 
@@ -332,11 +270,6 @@ Intervals measure_intervals(const std::vector<Time>& increasing) {
   out.median = median(steps);
   out.rate_hz = 1.0 / out.median.seconds();
   return out;
-}
-
-std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
-                                               std::vector<std::string> folders, const StereoRig& rig) {
-  return std::make_unique<EurocLoader>(std::move(files), std::move(root), std::move(folders), rig);
 }
 
 }  // namespace fbvins

@@ -66,8 +66,9 @@ Intervals measure_intervals(const std::vector<Time>& increasing);
 inline constexpr std::string_view kDepthFolder = "depth0/";
 
 /// `folders`: of the rig's cameras, in their order, with a slash at the end; twice the same where its images have both side by
-/// side.
-std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
-                                               std::vector<std::string> folders, const StereoRig& rig);
+/// side. Images of 16 bits with values of fewer are scaled, which `info` says.
+std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, const std::string& root,
+                                               std::vector<std::string> folders, const StereoRig& rig,
+                                               const std::vector<FrameEntry>& frames, DatasetInfo& info);
 
 }  // namespace fbvins

@@ -68,7 +68,7 @@ TEST(PairFrames, WithoutACommonTriggerTheOffsetsAreKept) {
       << "a short way ahead is nearer than a long one back";
   EXPECT_EQ(
       untriggered_sentence(soon.frames, 1, 3),
-      "cameras 0 and 1 have no common trigger: by stamps and time offsets their images are more than 3 ms apart, 5.0 ms in the median, and count as taken then");
+      "cameras 0 and 1 have no common trigger: by stamps and time offsets their images are more than 3 ms apart, 5.0 ms in the median, and count as taken then; of images that were taken at once, and only stamped apart, --pair-tolerance says so");
 }
 
 TEST(PairFrames, CamerasWithoutATriggerMayHaveOtherRates) {

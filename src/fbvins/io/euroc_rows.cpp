@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fbvins/io/csv.hpp"
+#include "fbvins/io/no_overlap.hpp"
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
@@ -43,10 +44,12 @@ std::vector<std::string> parts_of(const std::string& csv) {
 std::vector<std::string> row_warnings(const RowCounts& c, const std::string& file) {
   std::vector<std::string> out;
   if (c.wraps > 0) out.push_back(wrapped_sentence(file, c.wraps));
+  const std::string shared = shared_stamps(c.rows, c.duplicates);
   if (c.bad() > 0)
     out.push_back(
         fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}",
-                    file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
+                    file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad) +
+        (shared.empty() ? "" : "; ") + shared);
   return out;
 }
 

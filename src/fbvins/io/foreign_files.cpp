@@ -10,12 +10,16 @@
 namespace fbvins {
 namespace {
 
-constexpr const char
-    *kAsKalibr = "write its cameras as Kalibr's chain (docs/calibration.md, What is read)",
-    *kCalibrate = "calibrate with `fbvins calibrate`", *kOffline = "`fbvins run` and `fbvins info` read it",
-    *kOfDevice =
-        "`--source d435i` reads the device's own calibration, and a bag of its driver has it with /tf_static; else "
-        "calibrate with `fbvins calibrate`";
+constexpr const char *
+    kAsKalibr = "write its cameras as Kalibr's chain (docs/calibration.md, What is read)",
+   *kCalibrate = "calibrate with `fbvins calibrate`",
+   *kStereoPair =
+       "calibrate with `fbvins calibrate`, or write Kalibr's chain with its rotation and translation (in metres) as T_cn_cnm1 and the "
+       "T_cam_imu that it lacks",
+   *kOffline = "`fbvins run` and `fbvins info` read it",
+   *kOfDevice =
+       "`--source d435i` reads the device's own calibration, and a bag of its driver has it with /tf_static; else "
+       "calibrate with `fbvins calibrate`";
 
 /// All of the words are in a file of that kind, and seldom in another.
 struct Kind {
@@ -91,7 +95,15 @@ const std::vector<Kind>& kinds() {
        "give it by --imu-calibration, beside a calibration of the cameras"},
       {{"T_BS", "camera_model"}, "a camera's sensor.yaml of EuRoC", "give the folder that has cam0 and imu0"},
       {{"T_BS", "sensor_type"}, "a sensor.yaml of EuRoC", "give the folder that has cam0 and imu0"},
-      {{"M1:", "D1:"}, "OpenCV's calibration of a stereo pair, without its place on the IMU", kCalibrate},
+      {{"M1:", "D1:"}, "OpenCV's calibration of a stereo pair, without its place on the IMU", kStereoPair},
+      {{"K1:", "D1:"}, "OpenCV's calibration of a stereo pair, without its place on the IMU", kStereoPair},
+      {{"cameraMatrix1", "distCoeffs1"}, "OpenCV's calibration of a stereo pair, without its place on the IMU", kStereoPair},
+      {{"Calibration results", "cam0"}, "Kalibr's report as text", "give the camchain-imucam.yaml that Kalibr wrote beside it"},
+      {{"stereoParameters"}, "a calibration of a stereo pair as MATLAB prints it, without its place on the IMU", kStereoPair},
+      {{"IntrinsicMatrix", "RadialDistortion"}, "a camera's lens as MATLAB prints it, without its place on the IMU", kCalibrate},
+      {{"cameraParameters with properties"}, "a camera's lens as MATLAB prints it, without its place on the IMU", kCalibrate},
+      {{"fc_left", "kc_left"}, "a calibration of a stereo pair by Bouguet's toolbox, without its place on the IMU", kStereoPair},
+      {{"fc = [", "cc = ["}, "a camera's lens by Bouguet's toolbox (MATLAB), without its place on the IMU", kCalibrate},
       {{"stereo_calibration"}, "a calibration of a stereo pair, without its place on the IMU", kCalibrate},
       {{"P0:", "P1:"},
        "KITTI's calibration of rectified images, without the cameras' place on the IMU",

@@ -81,6 +81,25 @@ TEST(DecodePng, SixteenBitIsScaled) {
   EXPECT_EQ(image->at(2, 0), 0x12);
 }
 
+TEST(DecodePng, OfTenAndTwelveBitsTheUpperEightAreKept) {
+  const std::string grey = write_png(3, 1, 16, PNG_COLOR_TYPE_GRAY, {0x0F, 0xF0, 0x01, 0x23, 0x10, 0x00});
+  const std::string rgb = write_png(1, 1, 16, PNG_COLOR_TYPE_RGB, {0x0A, 0xB0, 0x0A, 0xB0, 0x0A, 0xB0});
+  EXPECT_EQ(largest_value_of_png(grey), 0x1000);
+  EXPECT_EQ(largest_value_of_png(rgb), 0x0AB0);
+  EXPECT_FALSE(largest_value_of_png(write_png(3, 1, 8, PNG_COLOR_TYPE_GRAY, ramp(3))));
+  EXPECT_FALSE(largest_value_of_png(grey.substr(0, grey.size() - 20)));
+  EXPECT_FALSE(largest_value_of_png("P5 3 1 255"));
+  const auto twelve = decode_image(grey, 12);
+  ASSERT_TRUE(twelve) << twelve.error().message;
+  EXPECT_EQ(twelve->at(0, 0), 0xFF);
+  EXPECT_EQ(twelve->at(1, 0), 0x12);
+  EXPECT_EQ(twelve->at(2, 0), 0xFF) << "brighter than the images that were tried";
+  EXPECT_EQ(decode_image(rgb, 12)->at(0, 0), 0xAB);
+  EXPECT_EQ(decode_image(write_png(3, 1, 8, PNG_COLOR_TYPE_GRAY, ramp(3)), 12)->at(1, 0), 37) << "eight bits are as they are";
+  EXPECT_EQ(decode_image(write_png(2, 1, 8, PNG_COLOR_TYPE_GRAY_ALPHA, {77, 0, 88, 255}), 12)->at(1, 0), 88);
+  for (std::size_t length = 0; length < grey.size(); ++length) EXPECT_FALSE(decode_image(grey.substr(0, length), 12)) << length;
+}
+
 TEST(DecodePng, ColourBecomesLuma) {
   const std::vector<std::uint8_t> rgb = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255, 100, 100, 100};
   const auto image = decode_image(write_png(5, 1, 8, PNG_COLOR_TYPE_RGB, rgb));
@@ -155,7 +174,11 @@ TEST(DecodeJpeg, CutOffIsAnError) {
 
 TEST(DecodeImage, OtherBytesAreRefused) {
   EXPECT_EQ(decode_image("").error().message, "the file is empty");
-  EXPECT_EQ(decode_image("GIF89a").error().message, "neither PNG nor JPEG");
+  EXPECT_EQ(decode_image("GIF89a").error().message, "GIF, neither PNG nor JPEG: write images as PNG");
+  EXPECT_EQ(decode_image("BM\x36").error().message.substr(0, 3), "BMP");
+  EXPECT_EQ(decode_image("P5\n3 1\n255\n").error().message.substr(0, 3), "PGM");
+  EXPECT_EQ(decode_image(std::string_view("MM\0*", 4)).error().message.substr(0, 4), "TIFF");
+  EXPECT_EQ(decode_image("GLB").error().message, "neither PNG nor JPEG");
 }
 
 }  // namespace image_decode_test

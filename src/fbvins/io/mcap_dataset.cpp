@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "fbvins/camera/camera_times.hpp"
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -241,6 +242,7 @@ class RecordReader {
                                         own && *own ? (*own)->imu_noise : ImuNoise{});
     if (!rig) return rig.error();
     out_.rig = *rig;
+    for (std::string& doubt : chain_doubts(options_.kalibr_camchain)) out_.info.warnings.push_back(std::move(doubt));
     if (!imu.empty() || (own && *own)) return {};
     const std::string why = own ? own->error().message : fmt::format("{}: holds no calibration", name_);
     out_.info.warnings.push_back(fmt::format("{}; IMU noise figures are the defaults", why));

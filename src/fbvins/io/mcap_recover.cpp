@@ -9,8 +9,12 @@
 #include <set>
 #include <vector>
 
+#include "fbvins/io/cdr.hpp"
+#include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 #include "fbvins/io/mcap_writer.hpp"
+#include "fbvins/io/rig_text.hpp"
+#include "fbvins/io/ros_definitions.hpp"
 
 namespace fbvins {
 namespace {
@@ -21,6 +25,7 @@ constexpr std::size_t kLargeChunk_bytes = 1'000'000;
 struct Contents {
   std::vector<McapTopic> topics;
   std::map<std::string, std::size_t> numbers;  ///< by topic
+  std::string rig;                             ///< the calibration of a record that becomes a bag
   std::vector<McapAttachment> attachments;
   std::vector<McapMetadata> metadata;
   RecoveredMcap found;
@@ -70,6 +75,31 @@ Result<void> rename(Contents& contents, const McapPart& part, const std::string&
   return {};
 }
 
+/// Takes the attached calibration for a message, which says of which topics it is.
+Result<void> become_bag(Contents& contents, const std::string& path) {
+  const auto attached = std::ranges::find(contents.attachments, kCalibrationAttachment, &McapAttachment::name);
+  if (attached == contents.attachments.end()) return {};
+  const Result<StereoRig> rig = parse_rig(attached->data, fmt::format("{}: {}", path, attached->name));
+  if (!rig) return rig.error();
+  std::vector<std::string> images;
+  for (int i = 0; i < rig->camera_count(); ++i) {
+    const auto topic = contents.numbers.find(camera_topic(i));
+    images.push_back(topic == contents.numbers.end() ? camera_topic(i) : contents.topics[topic->second].topic);
+  }
+  contents.rig = with_topics(attached->data, images);
+  contents.attachments.erase(attached);
+  constexpr const char* kText = "std_msgs/msg/String";
+  contents.topics.push_back({std::string(kRigTopic), kText, ros_definition(kText)});
+  return {};
+}
+
+void write_rig(Contents& contents, McapWriter& writer, Time t) {
+  CdrWriter cdr(writer.begin_message(contents.topics.size() - 1, t));
+  cdr.text(contents.rig);
+  writer.end_message();
+  ++contents.found.messages, ++contents.found.topics.back().messages;
+}
+
 Result<void> write(Contents& contents, McapReader& reader, McapWriter& writer, const McapPart& part) {
   RecoveredMcap& written = contents.found;
   for (const McapAttachment& a : contents.attachments)
@@ -78,11 +108,15 @@ Result<void> write(Contents& contents, McapReader& reader, McapWriter& writer, c
     if (Result<void> done = writer.add_metadata(m.name, m.values); !done) return done;
   while (const auto message = reader.next()) {
     if (message->log_time < part.from || message->log_time >= part.to) continue;
+    if (written.messages == 0) {
+      written.first = written.last = message->log_time;
+      if (!contents.rig.empty()) write_rig(contents, writer, message->log_time);
+    }
     const std::size_t topic = contents.numbers.at(message->channel->topic);
     writer.begin_message(topic, message->log_time) += message->data;
     writer.end_message();
-    written.first = written.messages == 0 ? message->log_time : std::min(written.first, message->log_time);
-    written.last = written.messages == 0 ? message->log_time : std::max(written.last, message->log_time);
+    written.first = std::min(written.first, message->log_time);
+    written.last = std::max(written.last, message->log_time);
     ++written.messages, ++written.topics[topic].messages;
     if (writer.waiting_bytes() < kLargeChunk_bytes) continue;
     if (Result<void> done = writer.flush(); !done) return done;
@@ -96,9 +130,13 @@ Result<RecoveredMcap> recover_mcap(const std::string& in, const std::string& out
   Result<Contents> contents = survey(in);
   if (!contents) return contents.error();
   if (Result<void> done = rename(*contents, part, in); !done) return done.error();
+  const bool bag = part.bag || !part.names.empty();
+  if (bag)
+    if (Result<void> done = become_bag(*contents, in); !done) return done.error();
   Result<McapReader> reader = open(in);
   if (!reader) return reader.error();
-  Result<McapWriter> writer = McapWriter::create(out, {"ros2", "fbvins"}, contents->topics);
+  // What names fbvins is taken for a flight record.
+  Result<McapWriter> writer = McapWriter::create(out, {"ros2", bag ? "FB-VINS" : "fbvins"}, contents->topics);
   if (!writer) return writer.error();
   contents->found.messages = 0;
   for (const McapTopic& topic : contents->topics) contents->found.topics.push_back({topic.topic, topic.type, 0});

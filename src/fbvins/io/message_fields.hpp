@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: the fields of a message one after the other, in ROS 1's encoding (packed) or in CDR, as ROS 2 has it. Messages
-// that both have in common are read by one function. After the first incomplete field all are zero or empty.
+// Private: the fields of a message one after the other, in ROS 1's encoding (packed) or in CDR of either byte order, as ROS 2 has
+// it. Messages that both have in common are read by one function. After the first incomplete field all are zero or empty.
 //
 //   MessageFields in(bytes, Encoding::ros1);
 //   const Time t = in.header();
 //   if (!in.ok()) ...
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string_view>
 
@@ -22,8 +23,9 @@ class MessageFields {
  public:
   MessageFields(std::string_view bytes, Encoding encoding) : in_(bytes), cdr_(encoding == Encoding::cdr) {
     if (!cdr_) return;
-    const std::string_view kind = in_.take(kCdrHead_bytes);  // little-endian, plain
-    ok_ = kind.size() == kCdrHead_bytes && kind[0] == 0 && kind[1] == 1;
+    const std::string_view kind = in_.take(kCdrHead_bytes);  // plain
+    ok_ = kind.size() == kCdrHead_bytes && kind[0] == 0 && (kind[1] == 0 || kind[1] == 1);
+    swaps_ = ok_ && kind[1] == 0;
   }
 
   bool ok() const { return ok_ && in_.ok(); }
@@ -34,7 +36,12 @@ class MessageFields {
       const std::size_t behind = (in_.position() - kCdrHead_bytes) % sizeof(Number);
       if (behind != 0) in_.skip(sizeof(Number) - behind);
     }
-    return in_.get<Number>();
+    Number value = in_.get<Number>();
+    if (swaps_) {
+      auto* bytes = reinterpret_cast<unsigned char*>(&value);
+      std::reverse(bytes, bytes + sizeof value);
+    }
+    return value;
   }
   std::string_view text() {
     const std::string_view out = bytes();
@@ -72,7 +79,7 @@ class MessageFields {
 
   ByteCursor in_;
   std::string_view frame_;
-  bool cdr_, ok_ = true;
+  bool cdr_, ok_ = true, swaps_ = false;  ///< big-endian
 };
 
 }  // namespace fbvins

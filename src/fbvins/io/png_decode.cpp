@@ -43,15 +43,16 @@ void on_read(png_structp png, png_bytep out, std::size_t length) {
 
 void on_warning(png_structp, png_const_charp) {}
 
-/// Reads the header and asks for 8 bits a channel, 1 or 3 channels; for depths for what there is, in the machine's byte order.
-bool read_header(PngJob& job, bool depths) {
+/// Reads the header and asks for 8 bits a channel, 1 or 3 channels; `wide`: for 16 where there are 16, in the machine's byte
+/// order.
+bool read_header(PngJob& job, bool wide) {
   if (setjmp(png_jmpbuf(job.png))) return false;
   png_set_user_limits(job.png, kLargestImageSide_px, kLargestImageSide_px);
   png_set_read_fn(job.png, &job, on_read);
   png_read_info(job.png, job.info);
   png_set_expand_gray_1_2_4_to_8(job.png);
   png_set_palette_to_rgb(job.png);
-  if (!depths) png_set_scale_16(job.png);
+  if (!wide) png_set_scale_16(job.png);
   else if constexpr (std::endian::native == std::endian::little) png_set_swap(job.png);
   png_set_strip_alpha(job.png);
   png_set_interlace_handling(job.png);
@@ -79,21 +80,55 @@ void to_luma(const std::uint8_t* rgb, int count, std::uint8_t* grey) {
 Error failure(const PngJob& job) { return {ErrorCode::malformed, fmt::format("damaged PNG: {}", job.message)}; }
 
 /// The header, and whether the image is one.
-Result<void> begin(PngJob& job, std::string_view bytes, bool depths) {
+Result<void> begin(PngJob& job, std::string_view bytes, bool wide) {
   job.bytes = bytes;
   job.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning);
   if (job.png) job.info = png_create_info_struct(job.png);
-  if (!job.info || !read_header(job, depths)) return failure(job);
+  if (!job.info || !read_header(job, wide)) return failure(job);
   return check_image_size(job.width, job.height);
+}
+
+/// Values of 16 bits, row by row, where the header says so; empty where the image is damaged.
+std::vector<std::uint16_t> wide_values(PngJob& job) {
+  const std::size_t row = static_cast<std::size_t>(job.width) * static_cast<std::size_t>(job.channels);
+  std::vector<std::uint16_t> values(row * job.height);
+  for (std::size_t y = 0; y < job.height; ++y) job.rows.push_back(reinterpret_cast<png_bytep>(values.data() + y * row));
+  if (!read_pixels(job)) values.clear();
+  return values;
+}
+
+/// The upper eight of the bits used; brighter than these can say is white.
+Result<Image> narrowed(PngJob& job, int used_bits) {
+  const std::vector<std::uint16_t> values = wide_values(job);
+  if (values.empty()) return failure(job);
+  std::vector<std::uint8_t> narrow(values.size());
+  std::ranges::transform(values, narrow.begin(),
+                         [&](int v) { return static_cast<std::uint8_t>(std::min(v >> (used_bits - 8), 255)); });
+  Image image(static_cast<int>(job.width), static_cast<int>(job.height));
+  const std::size_t row = static_cast<std::size_t>(job.width) * static_cast<std::size_t>(job.channels);
+  for (int y = 0; y < image.height(); ++y) {
+    const std::uint8_t* from = narrow.data() + row * static_cast<std::size_t>(y);
+    if (job.channels == 3) to_luma(from, image.width(), image.row(y));
+    else std::copy_n(from, row, image.row(y));
+  }
+  return image;
 }
 
 }  // namespace
 
-Result<Image> decode_png(std::string_view bytes) {
+std::optional<std::uint16_t> largest_value_of_png16(std::string_view bytes) {
   PngJob job;
-  if (Result<void> begun = begin(job, bytes, false); !begun) return begun.error();
+  if (!begin(job, bytes, true) || job.bits != 16) return std::nullopt;
+  const std::vector<std::uint16_t> values = wide_values(job);
+  return values.empty() ? std::nullopt : std::optional(*std::ranges::max_element(values));
+}
+
+Result<Image> decode_png(std::string_view bytes, int used_bits) {
+  PngJob job;
+  if (Result<void> begun = begin(job, bytes, used_bits < 16); !begun) return begun.error();
   if (job.channels != 1 && job.channels != 3)
     return Error{ErrorCode::unsupported, fmt::format("a PNG of {} channels", job.channels)};
+  if (job.bits == 16) return narrowed(job, used_bits);
   const int width = static_cast<int>(job.width), height = static_cast<int>(job.height);
   Image image(width, height);
   std::vector<std::uint8_t> colour;

@@ -2,6 +2,8 @@
 // Private to io: the PNG half of image_decode.hpp, apart because libpng reports errors by longjmp.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "fbvins/core/result.hpp"
@@ -9,7 +11,10 @@
 
 namespace fbvins {
 
-Result<Image> decode_png(std::string_view bytes);
+/// Of 16 bits of which only `used_bits` are used the upper eight of these.
+Result<Image> decode_png(std::string_view bytes, int used_bits);
+/// None of an image of 8 bits, and where the bytes are no whole PNG.
+std::optional<std::uint16_t> largest_value_of_png16(std::string_view bytes);
 /// One of 16-bit grey, as depth images are.
 Result<DepthImage> decode_png16(std::string_view bytes);
 

@@ -2,6 +2,7 @@
 #include "fbvins/io/rig_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/imu_axes_fields.hpp"
@@ -10,6 +11,7 @@ namespace fbvins {
 namespace {
 
 // Of a camera, beyond the rig's: so the sum is the same to the last bit.
+constexpr const char* kTopics = "image_topics";
 constexpr const char *kMoreOffset = "more_time_offset_s", *kMoreDelay = "more_line_delay_s";
 
 std::string own_times_text(const Camera& camera) {
@@ -78,19 +80,29 @@ std::vector<MountedCamera> read_cameras(YamlReader& yaml) {
 
 }  // namespace
 
-std::string rig_to_yaml(const StereoRig& rig) {
+std::string with_topics(const std::string& text, const std::vector<std::string>& topics) {
+  return topics.empty() ? text : fmt::format("{}: [\"{}\"]\n{}", kTopics, fmt::join(topics, "\", \""), text);
+}
+
+std::vector<std::string> topics_in(const std::string& text) {
+  YamlReader yaml(std::string(kRigTopic), text);
+  return yaml.texts(yaml.root(), kTopics);
+}
+
+std::string rig_to_yaml(const StereoRig& rig, const std::vector<std::string>& topics) {
   const ImuNoise& n = rig.imu_noise;
-  return "# The rig, every number exact. T_BC takes camera to body (IMU) coordinates, quaternions are Hamilton's with w first;\n"
-         "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
-         cameras_text(rig) + fmt::format("imu:\n  rate_hz: {:.17g}\n", n.rate_hz) + imu_noise_text(n, "  ", "{:.17g}") +
-         fmt::format("  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\n", n.max_gyro_radps, n.max_accel_mps2) +
-         imu_axes_text(n.axes, "  ", true) +
-         fmt::format("image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n", rig.image_rate_hz, rig.time_offset_s) +
-         (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s)) +
-         (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "") +
-         (rig.depth && rig.depth->own
-              ? camera_text("depth_camera", rig.depth->own->camera) + pose_text("T_BD", rig.depth->own->T_BC)
-              : "");
+  const std::string text =
+      "# The rig, every number exact. T_BC takes camera to body (IMU) coordinates, quaternions are Hamilton's with w first;\n"
+      "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
+      cameras_text(rig) + fmt::format("imu:\n  rate_hz: {:.17g}\n", n.rate_hz) + imu_noise_text(n, "  ", "{:.17g}") +
+      fmt::format("  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\n", n.max_gyro_radps, n.max_accel_mps2) +
+      imu_axes_text(n.axes, "  ", true) +
+      fmt::format("image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n", rig.image_rate_hz, rig.time_offset_s) +
+      (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s)) +
+      (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "") +
+      (rig.depth && rig.depth->own ? camera_text("depth_camera", rig.depth->own->camera) + pose_text("T_BD", rig.depth->own->T_BC)
+                                   : "");
+  return with_topics(text, topics);
 }
 
 Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/io/message_fields.hpp"
 #include "fbvins/io/ros_definitions.hpp"
 
 namespace fbvins {
@@ -71,6 +72,23 @@ TEST(RosMessages, AnImageComesBackWithItsPixels) {
   append_image(nothing, Time{5}, kLeftFrame, nullptr);
   ASSERT_TRUE(read_image(nothing));
   EXPECT_TRUE(read_image(nothing)->empty());
+}
+
+TEST(MessageFields, AreReadInBothByteOrders) {
+  // A text of length 3 with its zero, two bytes at 8, eight bytes at 16 behind the head.
+  std::string little = {0, 1, 0, 0, 3, 0, 0, 0, 'a', 'b', 0, 0, 2, 1}, big = {0, 0, 0, 0, 0, 0, 0, 3, 'a', 'b', 0, 0, 1, 2};
+  little += std::string(6 + 6, '\0') + "\xF8\x3F";
+  big += std::string(6, '\0') + "\x3F\xF8" + std::string(6, '\0');
+  for (const std::string& bytes : {little, big}) {
+    MessageFields in(bytes, Encoding::cdr);
+    EXPECT_EQ(in.text(), "ab");
+    EXPECT_EQ(in.get<std::uint16_t>(), 0x0102);
+    EXPECT_EQ(in.get<double>(), 1.5);
+    EXPECT_TRUE(in.ok());
+    in.get<std::uint8_t>();
+    EXPECT_FALSE(in.ok());
+  }
+  EXPECT_FALSE(MessageFields(std::string("\0\2\0\0", 4), Encoding::cdr).ok());
 }
 
 TEST(RosMessages, AnythingShorterIsRefused) {

@@ -49,7 +49,9 @@ Result<RecoveredMcap> write_rosbag2(const std::string& in, const std::string& ou
     return Error{ErrorCode::unwritable,
                  fmt::format("{}: {}", out, failed ? "the folder cannot be made: " + failed.message() : "exists already")};
   const std::string file = folder.filename().string() + "_0.mcap";
-  auto written = recover_mcap(in, (folder / file).string(), part);
+  McapPart bag = part;
+  bag.bag = true;
+  auto written = recover_mcap(in, (folder / file).string(), bag);
   if (written)
     if (Result<void> done = write_file_atomically((folder / "metadata.yaml").string(), metadata(file, *written)); !done)
       written = done.error();

@@ -16,7 +16,7 @@ RowVerdict NumbersRowParser::operator()(std::string_view line, StampedNumbers& r
   if (std::ranges::find(counts_, row.count) == counts_.end()) {
     std::vector<std::size_t> columns = counts_;
     for (std::size_t& c : columns) ++c;
-    problem = fmt::format("{} columns where {} are needed", fields_.size(), fmt::join(columns, " or "));
+    problem = columns_sentence(line, fields_.size(), fmt::format("{}", fmt::join(columns, " or ")));
     return RowVerdict::malformed;
   }
   const auto stamp = parse_nanoseconds(fields_[0]);

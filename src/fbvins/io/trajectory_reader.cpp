@@ -13,6 +13,7 @@
 #include "fbvins/io/no_pose.hpp"
 #include "fbvins/io/numbers.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/io/trajectory_columns.hpp"
 #include "fbvins/io/trajectory_format.hpp"
 
 namespace fbvins {
@@ -80,6 +81,43 @@ struct Row {
   std::string health = {};  ///< of a row of ours without a pose
 };
 
+/// The rows in order of their stamps; none where they are, or one has no stamp.
+std::optional<std::string> sorted_by_stamp(const TrajectoryLayout& layout, const std::vector<CsvLine>& data) {
+  std::vector<std::pair<Time, std::string_view>> rows;
+  std::vector<std::string_view> fields;
+  for (const CsvLine& line : data) {
+    split_row(layout, line.text, fields);
+    const auto t = fields.size() > layout.stamp ? parse_stamp(layout, fields[layout.stamp]) : std::nullopt;
+    if (!t) return std::nullopt;
+    rows.emplace_back(*t, line.text);
+  }
+  const auto earlier = [](const auto& a, const auto& b) { return a.first < b.first; };
+  if (std::ranges::is_sorted(rows, earlier)) return std::nullopt;
+  std::ranges::stable_sort(rows, earlier);
+  std::string out;
+  for (const auto& [t, row] : rows) out.append(row) += '\n';
+  return out;
+}
+
+/// Rows as read_rows() knows them, and what was done to them.
+RewrittenRows prepared(std::string_view text, TrajectoryFormat& format) {
+  RewrittenRows out{std::string(text), ""};
+  for (const auto step : {with_decimal_points, by_column_names, with_no_orientation}) {
+    std::optional<RewrittenRows> rows = step(out.text);
+    if (!rows) continue;
+    out.said += (out.said.empty() ? "" : ", ") + rows->said;
+    out.text = std::move(rows->text);
+    if (rows->w_first) format.w_first = rows->w_first;
+  }
+  return out;
+}
+
+void add_said(const std::string& said, std::string& recognised) {
+  if (!said.empty()) recognised = said + (recognised.empty() ? "" : ", ") + recognised;
+}
+
+Result<TrajectoryFile> read_rows(std::string_view text, const std::string& file, const TrajectoryFormat& format);
+
 }  // namespace
 
 Result<TrajectoryFormat> parse_trajectory_format(const std::string& text) {
@@ -96,7 +134,29 @@ Result<TrajectoryFormat> parse_trajectory_format(const std::string& text) {
   return out;
 }
 
-Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file, const TrajectoryFormat& format) {
+Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file, const TrajectoryFormat& given) {
+  TrajectoryFormat format = given;
+  const RewrittenRows rows = prepared(text, format);
+  Result<TrajectoryFile> out = read_rows(rows.text, file, format);
+  if (!out) {
+    // Refused: where only the order of the rows is wrong they are good once they are sorted.
+    const std::vector<CsvLine> lines = lines_of(rows.text), data = data_lines(rows.text);
+    const auto layout = recognise(data, lines.empty() ? "" : lines.front().text, file, format);
+    const auto sorted = layout ? sorted_by_stamp(*layout, data) : std::nullopt;
+    Result<TrajectoryFile> again = out;
+    if (sorted) again = read_rows(*sorted, file, {layout->unit_ns, layout->w_first});
+    if (sorted && again) {
+      out = std::move(again);
+      add_said("rows out of order, sorted by their stamps", out->recognised);
+    }
+  }
+  if (out) add_said(rows.said, out->recognised);
+  return out;
+}
+
+namespace {
+
+Result<TrajectoryFile> read_rows(std::string_view text, const std::string& file, const TrajectoryFormat& format) {
   const std::vector<CsvLine> lines = lines_of(text), data = data_lines(text);
   const auto layout = recognise(data, lines.empty() ? "" : lines.front().text, file, format);
   if (!layout) return layout.error();
@@ -131,6 +191,8 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
   if (out.points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: no row has a pose", file)};
   return out;
 }
+
+}  // namespace
 
 Result<TrajectoryFile> read_trajectory(const std::string& path, const TrajectoryFormat& format) {
   Result<std::string> text = read_file(path, kLargestTrajectory_bytes);

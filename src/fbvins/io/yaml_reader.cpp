@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
 namespace {
+
+constexpr int kMostLooked = 10'000, kDeepestLooked = 3;
 
 /// Makes the OpenCV header a comment, keeping the number of lines. No other YAML directive may follow it.
 void hide_opencv_header(std::string& text) {
@@ -24,6 +27,17 @@ std::string one_line(std::string text) {
   return text;
 }
 
+/// The first line that a tab indents, from 1; 0 where none is.
+int line_with_tab(const std::string& text) {
+  int number = 1;
+  for (std::size_t at = 0; at < text.size(); ++number) {
+    const std::size_t end = std::min(text.find('\n', at), text.size()), first = text.find_first_not_of(" \t\r", at);
+    if (first < end && text[first] != '#' && text.find('\t', at) < first) return number;
+    at = end + 1;
+  }
+  return 0;
+}
+
 }  // namespace
 
 YamlReader::YamlReader(std::string file, std::string text, Root root) : file_(std::move(file)) {
@@ -31,12 +45,33 @@ YamlReader::YamlReader(std::string file, std::string text, Root root) : file_(st
   try {
     root_ = YAML::Load(text);
     if (root == Root::fields && !root_.IsMap()) error_.message = fmt::format("{}: holds no fields", file_);
+    int most = kMostLooked;
+    refuse_twice(root_, 0, most);
   } catch (const YAML::Exception& e) {
-    complain(e.mark, "not YAML: " + one_line(e.msg));
+    if (const int tab = line_with_tab(text); tab > 0)
+      error_.message = fmt::format("{}:{}: begins with a tab: YAML is indented by blanks", file_, tab);
+    else complain(e.mark, "not YAML: " + one_line(e.msg));
   } catch (const std::exception& e) {
     error_.message = fmt::format("{}: {}", file_, one_line(e.what()));
   }
   if (!ok()) root_ = YAML::Node();
+}
+
+/// Of a field that is there twice one would be taken, and nobody would know which. `most`: values that are looked at, as an alias
+/// may stand for very many.
+void YamlReader::refuse_twice(const YAML::Node& map, int depth, int& most) {
+  if (!map.IsMap() || depth > kDeepestLooked) return;
+  std::map<std::string, int> lines;
+  for (const auto& entry : map) {
+    if (--most < 0) return;
+    if (!entry.first.IsScalar()) continue;
+    const int line = entry.first.Mark().line + 1;
+    const auto [before, is_new] = lines.try_emplace(entry.first.Scalar(), line);
+    if (!is_new)
+      complain(entry.first, fmt::format("'{}' is there twice, first in line {}", one_line(entry.first.Scalar().substr(0, 80)),
+                                        before->second));
+    refuse_twice(entry.second, depth + 1, most);
+  }
 }
 
 YAML::Node YamlReader::get(const YAML::Node& map, const std::string& field) const {

@@ -6,7 +6,8 @@
 //   double rate_hz = yaml.positive(yaml.root(), "rate_hz");
 //   if (!yaml.ok()) return yaml.error();
 //
-// After a complaint every getter still returns a harmless value, so that reading code has no branches.
+// A field that is there twice is a complaint. After a complaint every getter still returns a harmless value, so that reading code
+// has no branches.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -63,6 +64,7 @@ class YamlReader {
   void complain(const YAML::Node& node, const std::string& sentence) { complain(node.Mark(), sentence); }
 
  private:
+  void refuse_twice(const YAML::Node& map, int depth, int& most);
   void flatten(const YAML::Node& node, const YAML::Node& map, const std::string& field, int depth, std::vector<double>& out);
 
   std::string file_;
