@@ -65,6 +65,7 @@ Result<Diagnosis> diagnose_group(const StereoRig& rig, const Replay& replay, Cal
   if (!evidence) return evidence.error();
   const Diagnosis as_given = examine(*evidence, style);
   if (!rig.has_right() || !is_strange(as_given)) return as_given;  // common mistakes are told apart by the epipolar error
+  if (std::ranges::find(as_given.findings, FindingKind::imu_stuck, &Finding::kind) != as_given.findings.end()) return as_given;
   Diagnosis best = as_given;
   int least = cost_of(as_given);
   for (const CommonMistake& mistake : common_mistakes(rig)) {

@@ -65,6 +65,7 @@ class Examination {
     return std::any_of(out_.findings.begin(), out_.findings.end(), [&](const Finding& f) { return f.kind == kind; });
   }
 
+  void impossible_readings();
   void readings();
   void images();
   bool fixed_in_view(double share_of_features);
@@ -116,6 +117,7 @@ class Examination {
   bool may_be_bias_ = false;  // a mean reading that is not gravity's
   double offset_s_ = 0;
   Vec3 gyro_bias_ = Vec3::Zero();
+  bool gyro_stuck_ = false, accel_stuck_ = false;
   bool turns_seen_ = false, turns_agree_ = false, motion_agrees_ = false;
   Diagnosis out_;
 };
