@@ -275,6 +275,15 @@ TEST(Checkup, StampsOfArrivalAreNoIntervals) {
       << "whole milliseconds";
 }
 
+TEST(Checkup, ImagesThinnedToAnotherRateAreNoIrregularStamps) {
+  EXPECT_TRUE(check_stamps(readings(), stamps_in_turns({150, 150, 150, 100, 150, 150}, 1, 50'000), rig()).empty())
+      << "20 to 7 Hz";
+  EXPECT_TRUE(check_stamps(readings(), stamps_in_turns({100, 133.333, 133.333}, 1, 50'000), rig()).empty()) << "30 to 8 Hz";
+  EXPECT_FALSE(says(check_stamps(readings(), stamps_in_turns({50, 100, 150, 100}, 1, 0), rig()), FindingKind::image_stamps));
+  EXPECT_TRUE(
+      says(check_stamps(readings(), stamps_in_turns({150, 150, 125, 150}, 1, 9'000'000), rig()), FindingKind::image_stamps));
+}
+
 /// White noise of these densities at 200 Hz, at rest or in motion.
 std::vector<ImuSample> noisy(double gyro, double accel, bool moving) {
   Rng rng(7);
