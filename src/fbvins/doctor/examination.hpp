@@ -95,6 +95,12 @@ class Examination {
   bool position(const AccelFit& fit);
   void accel_bias(const AccelFit& fit);
   void accel_scale(const AccelFit& fit);
+  struct AxesTried {
+    Mat3 axes;
+    double error_px = 0;
+  };
+  AxesTried tracks_with(const Mat3& axes, bool and_bias) const;
+  bool force_axes();
   void force();
   void force_change(const ChangeGroup& group, const Amount& amount);
   void baseline_length(double factor, double sigma);
