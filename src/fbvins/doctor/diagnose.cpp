@@ -26,12 +26,13 @@ std::shared_ptr<const Image> flipped(const std::shared_ptr<const Image>& image, 
   return out;
 }
 
-Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFlip flip) {
+Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFlip flip,
+                             FlippedCameras which = FlippedCameras::both) {
   EvidenceCollector gatherer(rig);
   const Result<void> played = replay([&](SensorEvent event) {
     if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && flip != ImageFlip::none) {
-      frame->left = flipped(frame->left, flip);
-      frame->right = flipped(frame->right, flip);
+      if (which != FlippedCameras::right) frame->left = flipped(frame->left, flip);
+      if (which != FlippedCameras::left) frame->right = flipped(frame->right, flip);
     }
     return gatherer.push(event);
   });
@@ -70,7 +71,7 @@ Result<Diagnosis> diagnose_group(const StereoRig& rig, const Replay& replay, Cal
   int least = cost_of(as_given);
   for (const CommonMistake& mistake : common_mistakes(rig)) {
     if (!may_be(mistake, *evidence, as_given)) continue;
-    const Result<Evidence> other = gather_from(mistake.rig, replay, mistake.flip);
+    const Result<Evidence> other = gather_from(mistake.rig, replay, mistake.flip, mistake.flipped);
     if (!other) return other.error();
     Diagnosis with_it = examine(*other, style);
     if (!explains_better(with_it, as_given, least)) continue;
