@@ -34,7 +34,7 @@ examples:
   fbvins doctor flight --fix fixed.yaml          writes a corrected calibration, after examining the recording again with it;
                                                  fly with it: fbvins run flight --calibration fixed.yaml
 
-exit codes: 0 nothing wrong in what was judged (with --fix: nothing wrong any more), 1 something is wrong, 2 wrong usage or bad input
+exit codes: 0 nothing wrong in what was judged (with --fix: nothing wrong any more), 1 something is wrong or no verdict is possible, 2 wrong usage or bad input
 )";
 
 struct Arguments {
@@ -54,7 +54,10 @@ Json to_json(const Diagnosis& diagnosis) {
                         {"expected", f.expected},
                         {"advice", f.advice},
                         {"corrected", f.corrected}});
-  return Json{{"findings", findings}, {"measured", diagnosis.measured}, {"not_judged", diagnosis.not_judged}};
+  return Json{{"findings", findings},
+              {"measured", diagnosis.measured},
+              {"not_judged", diagnosis.not_judged},
+              {"no_verdict", diagnosis.no_verdict}};
 }
 
 /// mask0.png, mask1.png: of the cameras in which something is fixed in view.
@@ -99,6 +102,8 @@ class PlayedRecording {
   std::unique_ptr<Dataset> data_;
   bool played_ = false;
 };
+
+bool is_right(const Diagnosis& diagnosis) { return diagnosis.findings.empty() && diagnosis.no_verdict.empty(); }
 
 /// Writes the corrected calibration; `corrected` loses its rig where the file would not be read back.
 Result<void> write_calibration(CorrectedRig& corrected, const std::string& file) {
@@ -151,14 +156,14 @@ int examine_recording(const Arguments& arguments) {
     if (Result<void> written = write_masks(*diagnosis, arguments.out); !written) return fail(written.error().message);
   if (arguments.fix.empty()) {
     print(*diagnosis, nullptr, arguments);
-    return diagnosis->findings.empty() ? kOk : kSensorsWrong;
+    return is_right(*diagnosis) ? kOk : kSensorsWrong;
   }
   Result<CorrectedRig> corrected = correct_rig(rig, *diagnosis, replay, style);
   if (!corrected) return fail(corrected.error().message);
   if (corrected->rig)
     if (Result<void> written = write_calibration(*corrected, arguments.fix); !written) return fail(written.error().message);
   print(*diagnosis, &*corrected, arguments);
-  return corrected->after.findings.empty() && (corrected->rig || diagnosis->findings.empty()) ? kOk : kSensorsWrong;
+  return is_right(corrected->after) && (corrected->rig || diagnosis->findings.empty()) ? kOk : kSensorsWrong;
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ int check_sensors(Source& source, double seconds) {
   const Diagnosis diagnosis = input.diagnosis(source.rig());
   for (const Finding& finding : diagnosis.findings) fmt::print("WRONG  {}\n", to_text(finding));
   for (const std::string& sentence : diagnosis.not_judged) fmt::print("-      not judged: {}\n", sentence);
-  fine = fine && diagnosis.findings.empty();
+  fine = fine && diagnosis.findings.empty() && diagnosis.no_verdict.empty();
   return fine ? kOk : kSensorsWrong;
 }
 

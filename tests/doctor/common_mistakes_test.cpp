@@ -51,6 +51,17 @@ TEST(CommonMistakes, ACameraUpsideDownSeesTheSame) {
   EXPECT_LT((px + there - Vec2(rig.left().width() - 1, rig.left().height() - 1)).norm(), 1e-9);
 }
 
+TEST(CommonMistakes, OneMirroredCameraIsThoughtOfWhereThePairHasNoMatches) {
+  const StereoRig rig = test::synthetic_rig();
+  const CommonMistake mirrored = mistake_with(common_mistakes(rig), "right camera's images mirrored");
+  EXPECT_EQ(mirrored.flipped, FlippedCameras::right);
+  Diagnosis diagnosis;
+  EXPECT_FALSE(may_be(mirrored, {}, diagnosis));
+  diagnosis.not_judged = {"the pair of cameras: too few points are seen in both images"};
+  EXPECT_TRUE(is_strange(diagnosis));
+  EXPECT_TRUE(may_be(mirrored, {}, diagnosis));
+}
+
 TEST(CommonMistakes, AreThoughtOfWhereSomethingIsVeryWrong) {
   Diagnosis diagnosis;
   EXPECT_FALSE(is_strange(diagnosis));

@@ -326,6 +326,18 @@ TEST(DoctorOfOneCamera, NamesTheAccelerometersBiasScaleAndAxes) {
   expect_named(crooked, FindingKind::accel_alignment, 6, 2);
 }
 
+TEST(DoctorOfOneCamera, NamesAnAccelerometerOfTheWrongSignOrAxes) {
+  Evidence negative = one_camera(), exchanged = one_camera();
+  for (ImuSample& sample : negative.imu) sample.accel_mps2 = -sample.accel_mps2;
+  for (ImuSample& sample : exchanged.imu) std::swap(sample.accel_mps2.x(), sample.accel_mps2.z());
+  for (const auto& [evidence, axes] : {std::pair{&negative, "(-x, -y, -z)"}, std::pair{&exchanged, "(z, y, x)"}}) {
+    const Diagnosis found = examine(*evidence);
+    const Finding* finding = find(found, FindingKind::accel_axes);
+    ASSERT_NE(finding, nullptr) << all_of(found);
+    EXPECT_NE(finding->measured.find(axes), std::string::npos) << finding->measured;
+  }
+}
+
 /// By two cameras, too: the accelerometer's axes of a RealSense before its calibration, and a gyroscope that reads forces.
 TEST(Doctor, NamesAxesThatAreNotSquareAndAGyroscopeThatReadsForces) {
   Evidence crooked = good(), forced = good();

@@ -20,6 +20,8 @@ std::string_view to_string(FindingKind kind) {
     case FindingKind::imu_noise: return "imu_noise";
     case FindingKind::saturation: return "saturation";
     case FindingKind::vibration: return "vibration";
+    case FindingKind::imu_stuck: return "imu_stuck";
+    case FindingKind::imu_spikes: return "imu_spikes";
     case FindingKind::imu_stamps: return "imu_stamps";
     case FindingKind::imu_gaps: return "imu_gaps";
     case FindingKind::clocks_apart: return "clocks_apart";

@@ -25,6 +25,8 @@ enum class FindingKind {
   imu_noise,
   saturation,
   vibration,
+  imu_stuck,
+  imu_spikes,
   imu_stamps,
   imu_gaps,
   // camera and IMU

@@ -5,6 +5,7 @@
 
 #include "fbvins/checkup/noise_figures.hpp"
 #include "fbvins/checkup/projector_dots.hpp"
+#include "fbvins/checkup/reading_faults.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
@@ -36,7 +37,8 @@ void FirstSeconds::keep(const StereoFrame& frame) {
 bool FirstSeconds::is_over() const { return !images_.empty() && (images_.back() - images_.front()).seconds() >= kLook_s; }
 
 std::vector<Finding> FirstSeconds::findings() const {
-  std::vector<Finding> findings = check_reading_units(samples_);
+  std::vector<Finding> findings = check_readings(samples_);
+  for (Finding& finding : check_reading_units(samples_)) findings.push_back(std::move(finding));
   for (Finding& finding : check_stamps(samples_, images_, rig_, ends_)) findings.push_back(std::move(finding));
   if (auto finding = check_noise_figures(rig_.imu_noise)) findings.push_back(std::move(*finding));
   if (auto finding = check_dots(share_of_dots(rig_.left(), kept_))) findings.push_back(std::move(*finding));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,11 @@ constexpr double kMostRepeated = 0.1;
 /// Root mean square deviation of the images' stamps from regular ones. Stamps of triggered cameras are a hundred times
 /// better.
 constexpr double kMostIrregular_s = 2e-3;
+
+/// Stamps that are whole multiples of a common interval, off it by less than this (root mean square), are those of a regular
+/// camera some of whose images were left out, on purpose or not. So long an interval is no clock's tick: that of Windows is 15.6
+/// ms, of Linux 10 ms at most.
+constexpr double kOnGrid_s = 5e-4, kCoarsestTick_s = 0.016;
 
 /// From this multiple of the usual step on something is missing: readings are often stamped less regularly than images.
 constexpr double kReadingGap = 2.5, kImageGap = 1.5;
@@ -215,17 +221,27 @@ void check_image_gaps(std::span<const Time> images, double period_s, const std::
   findings.push_back(std::move(finding));
 }
 
+/// Longer steps are pauses.
+constexpr double kPause_periods = 4;
+
 /// Root mean square deviation of stamps whose steps are whole periods; two stamps a step.
-double irregularity_s(std::span<const double> steps_s, double period_s) {
+double irregularity_s(std::span<const double> steps_s, double period_s, double most_periods = kPause_periods) {
   double sum = 0;
   int regular = 0;
   for (const double step : steps_s) {
     const double periods = std::max(std::round(step / period_s), 1.0);
-    if (periods > 4) continue;  // a pause
+    if (periods > most_periods) continue;
     sum += std::pow(step - periods * period_s, 2);
     ++regular;
   }
   return std::sqrt(sum / std::max(regular, 1) / 2);
+}
+
+/// Whether images were left out of regular ones, so that the usual step is several of the camera's.
+bool is_thinned(std::span<const double> steps_s, double usual_s) {
+  for (double parts = 2; usual_s / parts > kCoarsestTick_s; ++parts)
+    if (irregularity_s(steps_s, usual_s / parts, std::numeric_limits<double>::infinity()) < kOnGrid_s) return true;
+  return false;
 }
 
 void check_images(std::span<const Time> images, std::vector<Finding>& findings) {
@@ -236,7 +252,7 @@ void check_images(std::span<const Time> images, std::vector<Finding>& findings) 
   const std::optional<IntervalModes> modes = interval_modes(steps);
   check_image_gaps(images, period, modes, findings);
   const double irregular = modes ? modes->off_s : irregularity_s(steps, period);
-  if (irregular < kMostIrregular_s) return;
+  if (irregular < kMostIrregular_s || is_thinned(steps, period)) return;
   Finding finding;
   finding.kind = FindingKind::image_stamps;
   finding.size = 1e3 * irregular, finding.sigma = finding.size / std::sqrt(2.0 * static_cast<double>(steps.size()));

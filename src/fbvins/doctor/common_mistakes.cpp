@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/doctor/common_mistakes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -94,6 +96,27 @@ void add_images(const StereoRig& rig, std::vector<CommonMistake>& all) {
                    Mat3(R.asDiagonal())});
 }
 
+/// What one of the two cameras alone does.
+void add_images_of_one(const StereoRig& rig, bool left, std::vector<CommonMistake>& all) {
+  const std::string name = left ? "left" : "right";
+  StereoRig turned = rig;
+  MountedCamera& one = turned.cameras[left ? 0 : 1];
+  one.camera = half_turned(one.camera);
+  one.T_BC.q = one.T_BC.q * Quat(half_turn());
+  std::vector<CalibrationField> fields{mounting_of_right, lens_of_right, distortion_of_right};
+  if (left) fields = {mounting_of_left, lens_of_left, distortion_of_left};
+  all.push_back({FindingKind::images_turned, fmt::format("the {} camera's images upside down", name),
+                 "deliver the images as they were calibrated, or take the lines below", std::move(turned), ImageFlip::none,
+                 fields});
+  all.back().flipped = left ? FlippedCameras::left : FlippedCameras::right;
+  for (const auto& [flip, how] :
+       {std::pair{ImageFlip::left_right, "left to right"}, std::pair{ImageFlip::top_bottom, "top to bottom"}}) {
+    all.push_back({FindingKind::images_mirrored, fmt::format("the {} camera's images mirrored {}", name, how),
+                   "switch off the flip in that camera's driver: no calibration describes it", rig, flip});
+    all.back().flipped = left ? FlippedCameras::left : FlippedCameras::right;
+  }
+}
+
 Vec2 flipped(const Vec2& px, const Camera& camera, ImageFlip flip) {
   return {flip == ImageFlip::left_right ? camera.width() - 1 - px.x() : px.x(),
           flip == ImageFlip::top_bottom ? camera.height() - 1 - px.y() : px.y()};
@@ -116,6 +139,8 @@ double epipolar_error_px(const CommonMistake& mistake, const Evidence& evidence)
 
 /// A factor that is that of no unit.
 bool is_odd_factor(double factor) { return factor > 0.3 && factor < 3; }
+
+bool has_few_matches(const std::string& not_judged) { return not_judged.starts_with("the pair of cameras: too few"); }
 
 int open_figures(const Finding& finding) {
   switch (finding.kind) {
@@ -152,6 +177,8 @@ std::vector<CommonMistake> common_mistakes(const StereoRig& rig) {
   std::vector<CommonMistake> all;
   add_inverted(rig, all);
   add_images(rig, all);
+  add_images_of_one(rig, false, all);
+  add_images_of_one(rig, true, all);
   add_sizes(rig, all);
   return all;
 }
@@ -183,7 +210,7 @@ bool is_strange(const Diagnosis& as_given) {
   };
   if (concerns(lens_of_left, distortion_of_left) && concerns(lens_of_right, distortion_of_right)) return true;
   const bool unseen = std::any_of(as_given.not_judged.begin(), as_given.not_judged.end(), [](const std::string& text) {
-    return text.starts_with("the pair of cameras: too few") || text.starts_with("gyroscope, axes");
+    return has_few_matches(text) || text.starts_with("gyroscope, axes");
   });
   return unseen || std::any_of(as_given.findings.begin(), as_given.findings.end(), strange);
 }
@@ -191,6 +218,9 @@ bool is_strange(const Diagnosis& as_given) {
 bool may_be(const CommonMistake& mistake, const Evidence& evidence, const Diagnosis& as_given) {
   constexpr double kGood_px = 2, kTurned = 8 * kDegree;
   if (mistake.kind == FindingKind::calibration_size) return true;  // the matches were chosen by the lenses
+  // Of images one of which is mirrored there are no true matches, and nothing that needs them is known.
+  if (mistake.flipped != FlippedCameras::both && mistake.flip != ImageFlip::none)
+    return std::ranges::any_of(as_given.not_judged, has_few_matches);
   if (!evidence.stereo.empty() && epipolar_error_px(mistake, evidence) > kGood_px) return false;
   const bool axes_known =
       as_given.predicted_px && std::none_of(as_given.findings.begin(), as_given.findings.end(),

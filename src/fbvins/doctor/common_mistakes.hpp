@@ -12,6 +12,7 @@ namespace fbvins {
 
 /// How the images as they are recorded become those that a mistake's calibration is of.
 enum class ImageFlip { none, left_right, top_bottom };
+enum class FlippedCameras { both, left, right };
 
 struct CommonMistake {
   FindingKind kind = FindingKind::extrinsics_inverted;
@@ -22,6 +23,7 @@ struct CommonMistake {
   std::vector<CalibrationField> fields = {};  ///< empty: no calibration corrects it
   /// Rotation in images with that flip, in the axes of `rig`'s C0: that of a mirror image goes about other axes.
   Mat3 seen_as = Mat3::Identity();
+  FlippedCameras flipped = FlippedCameras::both;
 };
 
 /// All of them, common ones first.

@@ -82,6 +82,10 @@ Result<CorrectedRig> correct_rig(const StereoRig& rig, const Diagnosis& before, 
     corrected.why_not = "no calibration describes mirrored images";
     return corrected;
   }
+  if (std::ranges::find(before.findings, FindingKind::imu_stuck, &Finding::kind) != before.findings.end()) {
+    corrected.why_not = "an axis of the IMU is stuck, from which what else is found may come: mend it and record again";
+    return corrected;
+  }
   if (!concerns_calibration(before)) {
     corrected.why_not =
         before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be corrected in a calibration";

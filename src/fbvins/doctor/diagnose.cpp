@@ -26,11 +26,13 @@ std::shared_ptr<const Image> flipped(const std::shared_ptr<const Image>& image, 
   return out;
 }
 
-Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFlip flip) {
+Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFlip flip,
+                             FlippedCameras which = FlippedCameras::both) {
   EvidenceCollector gatherer(rig);
   const Result<void> played = replay([&](SensorEvent event) {
     if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && flip != ImageFlip::none) {
-      for (auto& image : frame->images) image = flipped(image, flip);
+      for (std::size_t i = 0; i < frame->images.size(); ++i)
+        if (which == FlippedCameras::both || (which == FlippedCameras::left) == (i == 0)) frame->images[i] = flipped(frame->images[i], flip);
     }
     return gatherer.push(event);
   });
@@ -64,11 +66,12 @@ Result<Diagnosis> diagnose_group(const StereoRig& rig, const Replay& replay, Cal
   if (!evidence) return evidence.error();
   const Diagnosis as_given = examine(*evidence, style);
   if (!rig.has_right() || !is_strange(as_given)) return as_given;  // common mistakes are told apart by the epipolar error
+  if (std::ranges::find(as_given.findings, FindingKind::imu_stuck, &Finding::kind) != as_given.findings.end()) return as_given;
   Diagnosis best = as_given;
   int least = cost_of(as_given);
   for (const CommonMistake& mistake : common_mistakes(rig)) {
     if (!may_be(mistake, *evidence, as_given)) continue;
-    const Result<Evidence> other = gather_from(mistake.rig, replay, mistake.flip);
+    const Result<Evidence> other = gather_from(mistake.rig, replay, mistake.flip, mistake.flipped);
     if (!other) return other.error();
     Diagnosis with_it = examine(*other, style);
     if (!explains_better(with_it, as_given, least)) continue;

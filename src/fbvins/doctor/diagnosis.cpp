@@ -25,6 +25,7 @@ std::string to_text(const Diagnosis& diagnosis, bool all) {
   for (const std::string& sentence : diagnosis.not_judged) text += fmt::format("not judged: {}\n", sentence);
   if (!diagnosis.measured.empty()) text += kNotSeen;
   const std::size_t findings = diagnosis.findings.size(), gaps = diagnosis.not_judged.size();
+  if (findings == 0 && !diagnosis.no_verdict.empty()) return text + "no verdict: " + diagnosis.no_verdict;
   text += fmt::format("{} in {}", findings == 0 ? "nothing wrong" : counted(findings, "finding"),
                       counted(diagnosis.measured.size(), "measurement"));
   if (gaps > 0) text += fmt::format("; {} could not be judged", counted(gaps, "point"));

@@ -30,8 +30,10 @@ struct Diagnosis {
   std::vector<Finding> findings;
   std::vector<std::string> measured;    ///< one sentence for each measurement, whether right or wrong
   std::vector<std::string> not_judged;  ///< what the recording does not show, and why
-  StereoRig rig;                        ///< the calibration with all findings corrected, of the images in their order
-  bool swapped = false;                 ///< left and right images are exchanged; `rig` is for them in their order
+  /// What a flight rests on and could not be judged at all, and what to do; empty where it could.
+  std::string no_verdict = {};
+  StereoRig rig;         ///< the calibration with all findings corrected, of the images in their order
+  bool swapped = false;  ///< left and right images are exchanged; `rig` is for them in their order
   /// How well the calibration as it was given explains the recording: typical epipolar error, and error of a feature predicted
   /// from image to image; none where it was not judged.
   std::optional<double> epipolar_px = {}, predicted_px = {};

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fbvins/checkup/noise_figures.hpp"
+#include "fbvins/checkup/reading_faults.hpp"
 #include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
@@ -30,8 +31,9 @@ Diagnosis Examination::run() {
   turns();
   stereo();
   if (turns_agree_) motion();
-  if (motion_agrees_ && has_depths()) accelerations();
-  if (motion_agrees_) force();
+  if (accel_stuck_) not_judged("accelerometer, position of the camera on the IMU: an axis of the accelerometer is stuck");
+  if (motion_agrees_ && has_depths() && !accel_stuck_) accelerations();
+  if (motion_agrees_ && !accel_stuck_) force();
   blur();
   return done();
 }
@@ -45,7 +47,22 @@ Diagnosis Examination::done() {
 
 void Examination::not_judged(std::string_view what) { out_.not_judged.emplace_back(what); }
 
+/// What no sensor can have measured; single readings are left out of what follows.
+void Examination::impossible_readings() {
+  for (const bool gyro : {true, false})
+    if (auto finding = check_stuck(evidence_.imu, gyro)) {
+      (gyro ? gyro_stuck_ : accel_stuck_) = true;
+      out_.findings.push_back(*std::move(finding));
+    }
+  const Spikes spikes = find_spikes(evidence_.imu);
+  if (spikes.at.empty()) return;
+  keep(check_spikes(spikes));
+  evidence_.imu = without(spikes, evidence_.imu);
+  imu_ = ImuSeries(evidence_.imu);
+}
+
 void Examination::readings() {
+  impossible_readings();
   for (Finding& finding : check_reading_units(evidence_.imu)) {
     if (finding.kind == FindingKind::accel_units) {
       const double gravity = finding.size * kGravity_mps2;

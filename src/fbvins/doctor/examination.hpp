@@ -65,6 +65,7 @@ class Examination {
     return std::any_of(out_.findings.begin(), out_.findings.end(), [&](const Finding& f) { return f.kind == kind; });
   }
 
+  void impossible_readings();
   void readings();
   void images();
   bool fixed_in_view(double share_of_features);
@@ -95,6 +96,12 @@ class Examination {
   bool position(const AccelFit& fit);
   void accel_bias(const AccelFit& fit);
   void accel_scale(const AccelFit& fit);
+  struct AxesTried {
+    Mat3 axes;
+    double error_px = 0;
+  };
+  AxesTried tracks_with(const Mat3& axes, bool and_bias) const;
+  bool force_axes();
   void force();
   void force_change(const ChangeGroup& group, const Amount& amount);
   void baseline_length(double factor, double sigma);
@@ -117,6 +124,7 @@ class Examination {
   bool may_be_bias_ = false;  // a mean reading that is not gravity's
   double offset_s_ = 0;
   Vec3 gyro_bias_ = Vec3::Zero();
+  bool gyro_stuck_ = false, accel_stuck_ = false;
   bool turns_seen_ = false, turns_agree_ = false, motion_agrees_ = false;
   Diagnosis out_;
 };

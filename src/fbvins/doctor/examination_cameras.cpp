@@ -108,6 +108,8 @@ void Examination::stereo() {
   }
   if (fit.changes.empty() && fit.error_px == 0) {
     not_judged("the pair of cameras: too few points are seen in both images");
+    out_.no_verdict =
+        "too few points are seen in both images, without which there is no flight with two cameras: look at both (is one dark, blurred, mirrored, turned, or of another scene?), and record before a textured scene";
     return;
   }
   pair_.judged = true;

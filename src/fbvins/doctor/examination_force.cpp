@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/examination.hpp"
 #include "fbvins/doctor/force_problem.hpp"
 
@@ -19,7 +21,11 @@ using doctor::kSignificant;
 constexpr std::size_t kFewestWindows = 6;
 constexpr int kRounds = 3;
 /// What tracks that are predicted by the readings are off by, at most, for the accelerometer to be judged.
-constexpr double kMostError_px = 1.5;
+constexpr double kMostError_px = 1.5, kUnpredicted_px = 10;
+/// For other axes than those delivered to be named. A handheld rig whose accelerometer has the wrong sign is predicted to 0.30 px
+/// with the right axes and to 1.5 and more with any other; a vehicle that hardly accelerates to 0.56 and 0.81 with wrong ones,
+/// where the right ones are no better than 1.7.
+constexpr double kMostErrorOfAxes_px = 0.75, kNextBest = 2;
 /// A change must leave less than this share of the error.
 constexpr double kLeaves = 0.97;
 constexpr double kBiasPractical_mps2 = 1;
@@ -46,22 +52,62 @@ double significant_part(const Amount& amount) {
   return std::sqrt(square);
 }
 
+ImuSeries with_force(const ImuSeries& imu, const Mat3& by) {
+  std::vector<ImuSample> samples = imu.samples();
+  for (ImuSample& sample : samples) sample.accel_mps2 = by * sample.accel_mps2;
+  return ImuSeries(samples);
+}
+
 }  // namespace
 
-void Examination::force() {
-  if (!has_depths() && accel_unit_ != 1) {
-    std::vector<ImuSample> samples = imu_.samples();
-    for (ImuSample& sample : samples) sample.accel_mps2 *= accel_unit_;
-    imu_ = ImuSeries(samples);
+Examination::AxesTried Examination::tracks_with(const Mat3& axes, bool and_bias) const {
+  ForceProblem problem(windows_of(evidence_, with_force(imu_, axes), rig_, offset_s_, gyro_bias_), rig_.T_BC0().p,
+                       rig_.left().focal_px());
+  problem.begin();
+  problem.free = kBiasGroup.unknowns;
+  if (and_bias && problem.windows() >= kFewestWindows) problem.converge();
+  return {axes, problem.windows() < kFewestWindows ? kUnpredicted_px : problem.typical_error()};
+}
+
+/// Whether other axes of the accelerometer, one of 48, predict the tracks, where those as delivered do not: a force of the wrong
+/// sign puts the scene behind the camera, and gravity is turned by the wrong axis.
+bool Examination::force_axes() {
+  AxesTried best{Mat3::Identity(), kUnpredicted_px}, second = best;
+  for (const Mat3& axes : signed_permutations()) {
+    const AxesTried tried = tracks_with(axes, false);
+    if (tried.error_px < best.error_px) second = std::exchange(best, tried);
+    else if (tried.error_px < second.error_px) second = tried;
   }
+  best = tracks_with(best.axes, true), second = tracks_with(second.axes, true);
+  measured(fmt::format(
+      "tracks predicted by the readings with the accelerometer's axes ({}): error {:.2f} px, with the next best {:.2f}",
+      axes_text(best.axes), best.error_px, second.error_px));
+  if (best.axes == Mat3::Identity() || best.error_px > kMostErrorOfAxes_px || second.error_px < kNextBest * best.error_px)
+    return false;
+  Finding& finding = found(FindingKind::accel_axes, best.error_px, 0, "px");
+  finding.measured = fmt::format(
+      "with the accelerometer's axes as delivered the readings do not predict what the images show, with ({}) they do, to {:.2f} px (with the next best axes {:.2f})",
+      axes_text(best.axes), best.error_px, second.error_px);
+  finding.expected = "(x, y, z), as the gyroscope's";
+  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(best.axes));
+  if (best.axes == Mat3(-Mat3::Identity()))
+    finding.advice += ": at rest with z up the accelerometer reads +9.81 along z, what holds it up, not gravity";
+  imu_ = with_force(imu_, best.axes);
+  return true;
+}
+
+void Examination::force() {
+  if (!has_depths() && accel_unit_ != 1) imu_ = with_force(imu_, accel_unit_ * Mat3::Identity());
   ForceProblem problem(windows_of(evidence_, imu_, rig_, offset_s_, gyro_bias_), rig_.T_BC0().p, rig_.left().focal_px());
   problem.free = kBiasGroup.unknowns;
   problem.begin();
   std::optional<BlockSolution> last = problem.windows() < kFewestWindows ? std::nullopt : problem.converge();
   const double with_bias_px = problem.typical_error();
   if (!last || problem.windows() < kFewestWindows || with_bias_px > kMostError_px) {
+    if (!has_depths() && !has(FindingKind::accel_axes) && force_axes()) return force();
     if (!has_depths())
-      not_judged("scale, bias and axes of the accelerometer: too few tracks, or the readings do not predict them");
+      not_judged(
+          "scale, bias and axes of the accelerometer: too few tracks, or the readings do not predict them; record faster motions, by hand to and fro along all axes, before a textured scene");
     return;
   }
   std::vector<const ChangeGroup*> found{&kBiasGroup};

@@ -66,6 +66,11 @@ void Examination::turns() {
     not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");
     return;
   }
+  if (gyro_stuck_) {
+    turns_seen_ = true;
+    not_judged("gyroscope, axes, rotation and time between camera and IMU: an axis of the gyroscope is stuck");
+    return;
+  }
   const TurnFit fit = fit_turns(pairs_, imu_, rig_);
   measured(fmt::format(
       "rotation seen: {:.4f} rad in a tenth of a second ({} pairs; by axis {:.4f} {:.4f} {:.4f}); correlation with the gyroscope {:.4f} at {:.1f} ms, scale {:.4f}",

@@ -18,14 +18,21 @@ namespace fbvins {
 class FreeStereo {
  public:
   FreeStereo();
-  /// The inliers of one essential matrix, with a loose threshold. Of `rig` only the camera models are used.
+  /// The inliers of one essential matrix, with a loose threshold, also of cameras one of which is upside down against the other.
+  /// Of `rig` only the camera models are used.
   std::vector<StereoPoint> match(const StereoRig& rig, const Image& left_image, const Image& right_image, const Pyramid& left,
                                  const Pyramid& right);
 
  private:
+  std::vector<StereoPoint> match_as(bool half_turned, const StereoRig& rig, const Image& right_image, const Pyramid& left,
+                                    const Pyramid& right);
+
   OrbExtractor extractor_;
   OrbFeatures left_, right_;
   Rng rng_;
+  Image turned_image_;
+  Pyramid turned_right_;
+  bool half_turned_ = false;  // as the images before
 };
 
 }  // namespace fbvins

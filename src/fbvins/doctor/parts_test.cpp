@@ -10,6 +10,8 @@
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/block_fit.hpp"
 #include "fbvins/doctor/depths.hpp"
+#include "fbvins/doctor/doctor.hpp"
+#include "fbvins/doctor/free_stereo.hpp"
 #include "fbvins/doctor/image_health.hpp"
 #include "fbvins/doctor/imu_health.hpp"
 #include "fbvins/doctor/imu_series.hpp"
@@ -17,6 +19,7 @@
 #include "fbvins/doctor/motion_problem.hpp"
 #include "fbvins/doctor/stereo_step.hpp"
 #include "fbvins/imu/propagation.hpp"
+#include "tests/support/noise_texture.hpp"
 #include "tests/support/synthetic_evidence.hpp"
 
 namespace fbvins {
@@ -148,6 +151,34 @@ TEST(StereoStep, GivesEachLeftImageTheRightOneThatBelongsToIt) {
       }
     EXPECT_EQ(frames, 10 - std::abs(lag));
   }
+}
+
+TEST(FreeStereo, MatchesACameraThatIsUpsideDown) {
+  const Camera camera(PinholeRadtan{.fx = 300, .fy = 300, .cx = 240, .cy = 160}, 480, 320);
+  const StereoRig rig{.cameras = {{camera, {}}, {camera, {}}}};
+  const NoiseTexture texture{7, 24};
+  const auto image = [&](double shift_px, bool turned, std::uint64_t seed) {
+    const auto place = [&](const Vec2& px) { return Vec2((turned ? Vec2(Vec2(479, 319) - px) : px) + Vec2(shift_px, 0)); };
+    return render_texture(480, 320, texture, place, 120, 35, 1.0, seed);
+  };
+  const Image left = image(0, false, 1), right = image(18, true, 2);
+  Pyramid of_left, of_right;
+  of_left.build(left.view(), 3), of_right.build(right.view(), 3);
+  FreeStereo stereo;
+  for (int time = 0; time < 2; ++time) {
+    const auto points = stereo.match(rig, left, right, of_left, of_right);
+    ASSERT_GT(points.size(), 30u);
+    for (const StereoPoint& point : points)
+      EXPECT_LT((Vec2(479, 319) - point.right - (point.left - Vec2(18, 0))).norm(), 1) << point.left.transpose();
+  }
+}
+
+TEST(Diagnosis, HasNoVerdictWhereWhatAFlightRestsOnWasNotJudged) {
+  Diagnosis diagnosis;
+  diagnosis.no_verdict = "too few points are seen in both images";
+  EXPECT_EQ(to_text(diagnosis), "no verdict: too few points are seen in both images");
+  diagnosis.findings.resize(1);
+  EXPECT_NE(to_text(diagnosis).find("1 finding in 0 measurements"), std::string::npos);
 }
 
 /// Of all features with depths by both.

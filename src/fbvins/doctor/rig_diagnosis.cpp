@@ -69,6 +69,7 @@ void add_group(const Diagnosis& found, const CameraGroup& group, bool first, Dia
   }
   for (const std::string& sentence : found.measured) all.measured.push_back(who + sentence);
   for (const std::string& sentence : found.not_judged) all.not_judged.push_back(who + sentence);
+  if (!found.no_verdict.empty() && all.no_verdict.empty()) all.no_verdict = who + found.no_verdict;
   if (first) {
     all.rig.imu_noise = found.rig.imu_noise;
     all.rig.time_offset_s = found.rig.time_offset_s - all.rig.camera(group.first).own_times().time_offset_s;
