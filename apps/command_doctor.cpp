@@ -140,18 +140,31 @@ void print(const Diagnosis& diagnosis, const CorrectedRig* corrected, const Argu
   else if (corrected != nullptr) fmt::print("{}\n", why_not);
 }
 
+/// Images of another shape than the calibration's are taken for cropped ones, or for squeezed ones where that explains them
+/// better.
+bool take_squeezed(StereoRig& rig, const std::vector<ScaledLens>& scaled, const Replay& replay, CalibrationStyle style,
+                   Diagnosis& cropped) {
+  const std::optional<StereoRig> other = squeezed_rig(rig, scaled);
+  if (!other || cropped.findings.empty()) return false;
+  Result<Diagnosis> found = examine_with(*other, replay, style);
+  if (!found || !is_squeezed(*found, cropped)) return false;
+  rig = *other, cropped = *std::move(found);
+  return true;
+}
+
 int examine_recording(const Arguments& arguments) {
   if (same_file(arguments.fix, arguments.recording.calibration))
     return fail(arguments.fix + ": is the calibration as given; --fix writes to another file");
   PlayedRecording recording(arguments.recording);
   if (Result<void> opened = recording.open(); !opened) return fail(opened.error().message);
-  const StereoRig rig = recording.rig();
+  StereoRig rig = recording.rig();
   const Replay replay = [&](const TakeEvent& take) { return recording.play(take); };
   const CalibrationStyle style = arguments.recording.calibration.empty() ? CalibrationStyle::euroc : CalibrationStyle::kalibr;
   const std::vector<ScaledLens> scaled = recording.scaled();
   Result<Diagnosis> diagnosis = diagnose(rig, replay, style);
   if (!diagnosis) return fail(diagnosis.error().message);
-  tell_of_scaled(scaled, style, *diagnosis);
+  const bool squeezed = take_squeezed(rig, scaled, replay, style, *diagnosis);
+  tell_of_scaled(scaled, style, *diagnosis, squeezed);
   if (!arguments.out.empty())
     if (Result<void> written = write_masks(*diagnosis, arguments.out); !written) return fail(written.error().message);
   if (arguments.fix.empty()) {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "fbvins/checkup/first_seconds.hpp"
-#include "fbvins/checkup/reading_faults.hpp"
 #include "fbvins/checkup/reading_noise_seen.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
@@ -75,42 +74,6 @@ TEST(Checkup, NamesUnits) {
   EXPECT_NEAR(findings.front().size, 1 / 9.80665, 0.01);
   EXPECT_NE(findings.front().advice.find("9.80665"), std::string::npos);
   EXPECT_TRUE(says(check_reading_units(in_degrees), FindingKind::gyro_units));
-}
-
-TEST(Checkup, NamesAnAxisThatIsStuck) {
-  EXPECT_TRUE(check_readings(readings()).empty());
-  auto dead = readings(), held = readings(), all = readings(), at_rest = readings();
-  for (std::size_t i = 0; i < dead.size(); ++i) {
-    dead[i].gyro_radps.z() = 0, all[i].gyro_radps.setZero();
-    if (i > 500) held[i].accel_mps2.y() = held[500].accel_mps2.y();
-    at_rest[i].gyro_radps = Vec3(0.001 * static_cast<double>(i % 2), 0, 0);  // one step of the resolution, and none
-  }
-  ASSERT_EQ(check_readings(dead).size(), 1u);
-  EXPECT_EQ(check_readings(dead).front().measured, "axis z of the gyroscope reads a constant 0");
-  EXPECT_NE(check_readings(all).at(0).measured.find("the gyroscope reads a constant (0, 0, 0)"), std::string::npos);
-  EXPECT_NE(check_readings(held).at(0).measured.find("axis y of the accelerometer reads a constant"), std::string::npos);
-  EXPECT_TRUE(check_readings(at_rest).empty());
-  FirstSeconds look(rig());
-  for (const ImuSample& sample : dead) look.push(sample);
-  EXPECT_TRUE(says(look.findings(), FindingKind::imu_stuck));
-}
-
-TEST(Checkup, NamesSpikesAndLeavesThemOut) {
-  auto spiky = readings(), shocks = readings(), vibrating = readings();
-  for (std::size_t i = 100; i < spiky.size(); i += 200) spiky[i].gyro_radps.y() += 20, spiky[i + 1].accel_mps2.x() -= 80;
-  shocks[300].accel_mps2.z() += 80, shocks[700].accel_mps2.z() += 80;
-  for (std::size_t i = 0; i < vibrating.size(); ++i) vibrating[i].accel_mps2.z() += i % 2 == 0 ? 40 : -40;
-  const Spikes spikes = find_spikes(spiky);
-  EXPECT_EQ(spikes.gyro, 6);
-  EXPECT_EQ(spikes.accel, 6);
-  EXPECT_TRUE(says(check_readings(spiky), FindingKind::imu_spikes));
-  const auto cleaned = without(spikes, spiky), as_they_were = readings();
-  for (std::size_t i = 0; i < cleaned.size(); ++i) {
-    EXPECT_LT((cleaned[i].gyro_radps - as_they_were[i].gyro_radps).norm(), 0.05);
-    EXPECT_LT((cleaned[i].accel_mps2 - as_they_were[i].accel_mps2).norm(), 0.5);
-  }
-  EXPECT_TRUE(check_readings(shocks).empty());
-  EXPECT_TRUE(check_readings(vibrating).empty());
 }
 
 TEST(Checkup, NamesExchangedSensors) {

@@ -116,9 +116,41 @@ Result<Diagnosis> diagnose_groups(const StereoRig& rig, const Replay& replay, Ca
   return all;
 }
 
+/// Not of the calibrated shape.
+bool is_cut(const ScaledLens& lens) {
+  const double factor = static_cast<double>(lens.images.width) / lens.calibrated.width;
+  return std::abs(factor * lens.calibrated.height - lens.images.height) > std::max(1.0, factor);
+}
+
 }  // namespace
 
-void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found) {
+std::optional<StereoRig> squeezed_rig(const StereoRig& rig, std::span<const ScaledLens> scaled) {
+  if (rig.camera_count() > 2 || std::ranges::none_of(scaled, is_cut)) return std::nullopt;
+  StereoRig out = rig;
+  for (const ScaledLens& lens : scaled) {
+    Camera& camera = lens.camera == 0 ? out.left : out.right;
+    if (!is_cut(lens) || camera.mask()) return std::nullopt;  // a mask was cut with the lens
+    const double in_x = static_cast<double>(lens.images.width) / lens.calibrated.width;
+    const double in_y = static_cast<double>(lens.images.height) / lens.calibrated.height;
+    const double left_px = 0.5 * (lens.calibrated.width - lens.images.width);  // as if cut off there
+    const double top_px = 0.5 * (lens.calibrated.height - lens.images.height);
+    auto model = camera.model();
+    std::visit(
+        [&](auto& m) {
+          m.fx *= in_x, m.fy *= in_y;
+          m.cx = (m.cx + left_px + 0.5) * in_x - 0.5, m.cy = (m.cy + top_px + 0.5) * in_y - 0.5;
+        },
+        model);
+    camera = camera.with_lens(model);
+  }
+  return out;
+}
+
+bool is_squeezed(const Diagnosis& squeezed, const Diagnosis& cropped) {
+  return squeezed.predicted_px && squeezed.not_judged.size() <= cropped.not_judged.size() && cost_of(squeezed) < cost_of(cropped);
+}
+
+void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found, bool squeezed) {
   if (scaled.empty()) return;
   using enum CalibrationField;
   Finding finding;
@@ -126,10 +158,6 @@ void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, 
   finding.size = static_cast<double>(scaled.front().images.width) / scaled.front().calibrated.width;
   finding.unit = "times the calibration's size";
   std::string cameras;
-  const auto is_cut = [](const ScaledLens& lens) {
-    const double factor = static_cast<double>(lens.images.width) / lens.calibrated.width;
-    return std::abs(factor * lens.calibrated.height - lens.images.height) > std::max(1.0, factor);
-  };
   const ScaledLens* before = nullptr;
   for (const ScaledLens& lens : scaled) {
     cameras += fmt::format("{}cam{}", cameras.empty() ? "" : ", ", lens.camera);
@@ -149,6 +177,11 @@ void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, 
     finding.advice =
         "calibrate at the size that is used, or take from the centres what was cut off at the left and at the top: all else was judged as "
         "if the images were the middle of the calibrated ones; where they were cut elsewhere, it is seen as their principal point";
+  if (squeezed)
+    finding.advice = fmt::format(
+        "the images were squeezed, in x by {:.3f} and in y by {:.3f}: scale them by one factor, or calibrate them as they are; all else was judged with lenses squeezed so",
+        static_cast<double>(scaled.front().images.width) / scaled.front().calibrated.width,
+        static_cast<double>(scaled.front().images.height) / scaled.front().calibrated.height);
   const bool is_pair = found.rig.camera_count() == 2;
   if (!is_pair) finding.fields.clear();  // lines name a pair's cameras
   found.findings.insert(found.findings.begin(), std::move(finding));

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "fbvins/core/result.hpp"
@@ -27,7 +28,13 @@ Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, Calibrati
 
 /// Of lenses that were scaled to the images (DatasetOptions::scale_lenses), with which `found` was found: one more finding, which
 /// they correct. With none of them nothing changes.
-void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found);
+void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found, bool squeezed = false);
+
+/// The rig with lenses of images that were squeezed to another shape, instead of those of the calibrated images' middle; none
+/// where no image has another shape.
+std::optional<StereoRig> squeezed_rig(const StereoRig& rig, std::span<const ScaledLens> scaled);
+/// Whether `squeezed` explains the recording better than `cropped`.
+bool is_squeezed(const Diagnosis& squeezed, const Diagnosis& cropped);
 
 /// The calibration as given, not compared with common mistakes.
 Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style);

@@ -6,10 +6,12 @@
 #include <numbers>
 #include <set>
 
+#include "fbvins/camera/scaled_lens.hpp"
 #include "fbvins/doctor/accel_fit.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/block_fit.hpp"
 #include "fbvins/doctor/depths.hpp"
+#include "fbvins/doctor/diagnose.hpp"
 #include "fbvins/doctor/doctor.hpp"
 #include "fbvins/doctor/free_stereo.hpp"
 #include "fbvins/doctor/image_health.hpp"
@@ -171,6 +173,19 @@ TEST(FreeStereo, MatchesACameraThatIsUpsideDown) {
     for (const StereoPoint& point : points)
       EXPECT_LT((Vec2(479, 319) - point.right - (point.left - Vec2(18, 0))).norm(), 1) << point.left.transpose();
   }
+}
+
+TEST(Diagnosis, ASqueezedLensSeesTheSame) {
+  const Camera calibrated(PinholeRadtan{.fx = 458, .fy = 457, .cx = 367, .cy = 248, .k1 = -0.28}, 752, 480);
+  StereoRig rig;
+  rig.left = *middle_of(calibrated, 640, 480);
+  const ScaledLens lens{.camera = 0, .calibrated = {752, 480}, .images = {640, 480}};
+  const std::optional<StereoRig> squeezed = squeezed_rig(rig, std::span(&lens, 1));
+  ASSERT_TRUE(squeezed);
+  const Vec3 point(0.5, -0.3, 1);
+  const Vec2 was = *calibrated.project(point), is = *squeezed->left.project(point);
+  EXPECT_NEAR(is.x() + 0.5, (was.x() + 0.5) * 640 / 752, 1e-9);
+  EXPECT_NEAR(is.y(), was.y(), 1e-9);
 }
 
 TEST(Diagnosis, HasNoVerdictWhereWhatAFlightRestsOnWasNotJudged) {
