@@ -32,7 +32,8 @@ Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFl
   const Result<void> played = replay([&](SensorEvent event) {
     if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && flip != ImageFlip::none) {
       for (std::size_t i = 0; i < frame->images.size(); ++i)
-        if (which == FlippedCameras::both || (which == FlippedCameras::left) == (i == 0)) frame->images[i] = flipped(frame->images[i], flip);
+        if (which == FlippedCameras::both || (which == FlippedCameras::left) == (i == 0))
+          frame->images[i] = flipped(frame->images[i], flip);
     }
     return gatherer.push(event);
   });

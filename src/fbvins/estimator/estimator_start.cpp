@@ -90,8 +90,8 @@ void Estimator::refuse_start(Odometry& out) {
   out.health = health_.start_refused();
 }
 
-/// The window of a start with one camera goes on, and nothing of it is published until it is seen to be right: a wrong scale shows
-/// as a contradiction or a large correction soon after.
+/// The window of a start with one camera goes on, and nothing of it is published until it is seen to be right: a wrong scale
+/// shows as a contradiction or a large correction soon after.
 void Estimator::stay_on_trial(const TrackedFrame& frame, Estimate& out) {
   Odometry& odometry = out.odometry;
   const bool waited_long = (frame.t - *waiting_since_).seconds() > kWaitedLong_s;
