@@ -39,7 +39,7 @@ struct RunSummary {
   LevelledStart truth_level;                        ///< that tilt, and the alignment without it
   std::optional<MapSummary> map;                    ///< with loop closure
   std::optional<RefinedCalibration> refined;
-  double time_offset_found_s = 0;  ///< besides that of the calibration; the ground truth was shifted by it
+  double time_offset_found_s = 0;              ///< besides that of the calibration; the ground truth was shifted by it
   DescriptorMatchCounts matches, raw_matches;  ///< over all frames; none of the klt frontend
   Survival survival;                           ///< over all frames
   double wall_s = 0;

@@ -177,13 +177,12 @@ TEST(FreeStereo, MatchesACameraThatIsUpsideDown) {
 
 TEST(Diagnosis, ASqueezedLensSeesTheSame) {
   const Camera calibrated(PinholeRadtan{.fx = 458, .fy = 457, .cx = 367, .cy = 248, .k1 = -0.28}, 752, 480);
-  StereoRig rig;
-  rig.left = *middle_of(calibrated, 640, 480);
+  const StereoRig rig{.cameras = {{*middle_of(calibrated, 640, 480), {}}}};
   const ScaledLens lens{.camera = 0, .calibrated = {752, 480}, .images = {640, 480}};
   const std::optional<StereoRig> squeezed = squeezed_rig(rig, std::span(&lens, 1));
   ASSERT_TRUE(squeezed);
   const Vec3 point(0.5, -0.3, 1);
-  const Vec2 was = *calibrated.project(point), is = *squeezed->left.project(point);
+  const Vec2 was = *calibrated.project(point), is = *squeezed->left().project(point);
   EXPECT_NEAR(is.x() + 0.5, (was.x() + 0.5) * 640 / 752, 1e-9);
   EXPECT_NEAR(is.y(), was.y(), 1e-9);
 }

@@ -119,7 +119,7 @@ class Estimator {
   WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused
   bool running_ = false;
   std::optional<Time> waiting_since_;  ///< for the first pose, or the first one after a loss
-  std::optional<StartTrial> trial_;  ///< one camera: the window goes on, and nothing of it is published yet
+  std::optional<StartTrial> trial_;    ///< one camera: the window goes on, and nothing of it is published yet
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();

@@ -19,8 +19,8 @@ constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
 constexpr double kSuspected_sigma = 1.7;
 /// Before the start one that was found is improved by less.
 constexpr double kImproved_sigma = 1;
-/// Once there was a pose, where it was known well enough for a start, so often in a row, after a loss, too, and the noise of stamps
-/// is a mean of so many solutions: a fault of the gyroscope or of its stamps is no offset.
+/// Once there was a pose, where it was known well enough for a start, so often in a row, after a loss, too, and the noise of
+/// stamps is a mean of so many solutions: a fault of the gyroscope or of its stamps is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
 /// A line delay likewise: global shutters stay what they are. Where the offset was wrong nobody has calibrated the line delay,
 /// either.
