@@ -129,7 +129,7 @@ std::optional<StereoRig> squeezed_rig(const StereoRig& rig, std::span<const Scal
   if (rig.camera_count() > 2 || std::ranges::none_of(scaled, is_cut)) return std::nullopt;
   StereoRig out = rig;
   for (const ScaledLens& lens : scaled) {
-    Camera& camera = lens.camera == 0 ? out.left : out.right;
+    Camera& camera = out.cameras[static_cast<std::size_t>(lens.camera)].camera;
     if (!is_cut(lens) || camera.mask()) return std::nullopt;  // a mask was cut with the lens
     const double in_x = static_cast<double>(lens.images.width) / lens.calibrated.width;
     const double in_y = static_cast<double>(lens.images.height) / lens.calibrated.height;
