@@ -157,7 +157,8 @@ TEST(StereoStep, GivesEachLeftImageTheRightOneThatBelongsToIt) {
 
 TEST(FreeStereo, MatchesACameraThatIsUpsideDown) {
   const Camera camera(PinholeRadtan{.fx = 300, .fy = 300, .cx = 240, .cy = 160}, 480, 320);
-  const StereoRig rig{.cameras = {{camera, {}}, {camera, {}}}};
+  StereoRig rig;
+  rig.cameras = {{camera, {}}, {camera, {}}};
   const NoiseTexture texture{7, 24};
   const auto image = [&](double shift_px, bool turned, std::uint64_t seed) {
     const auto place = [&](const Vec2& px) { return Vec2((turned ? Vec2(Vec2(479, 319) - px) : px) + Vec2(shift_px, 0)); };
@@ -177,7 +178,8 @@ TEST(FreeStereo, MatchesACameraThatIsUpsideDown) {
 
 TEST(Diagnosis, ASqueezedLensSeesTheSame) {
   const Camera calibrated(PinholeRadtan{.fx = 458, .fy = 457, .cx = 367, .cy = 248, .k1 = -0.28}, 752, 480);
-  const StereoRig rig{.cameras = {{*middle_of(calibrated, 640, 480), {}}}};
+  StereoRig rig;
+  rig.cameras = {{*middle_of(calibrated, 640, 480), {}}};
   const ScaledLens lens{.camera = 0, .calibrated = {752, 480}, .images = {640, 480}};
   const std::optional<StereoRig> squeezed = squeezed_rig(rig, std::span(&lens, 1));
   ASSERT_TRUE(squeezed);
