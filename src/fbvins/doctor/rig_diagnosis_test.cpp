@@ -106,7 +106,7 @@ TEST(RigDiagnosis, EachPairIsExaminedAndEachCameraWithoutAPartner) {
   };
   EXPECT_TRUE(told("cameras 0 and 2 as left and right: "));
   EXPECT_TRUE(told("cameras 1 and 3 as left and right: "));
-  EXPECT_TRUE(told("camera 4: gyroscope, axes, rotation and time"));
+  EXPECT_TRUE(told("camera 4: gyroscope, axes, rotation and time")) << testing::PrintToString(found->not_judged);
 }
 
 }  // namespace rig_diagnosis_test
