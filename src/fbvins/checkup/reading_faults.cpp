@@ -28,7 +28,8 @@ constexpr std::size_t kFewValues = 3, kManyValues = 300;
 /// and 7.9 m/s^2 away (the rotors of EuRoC's V1_02).
 constexpr double kSpike_radps = 1, kSpike_mps2 = 15;
 /// And so many times as far as any other of the readings around it: vibration makes each as bad. About four times at most in our
-/// recordings, from the neighbours that count.
+/// recordings, from the neighbours that count. And farther than any of those around is from 0: in degrees or thousandths of g all
+/// readings are large.
 constexpr double kAlone = 6;
 constexpr std::size_t kAround = 10;
 /// One or two are shocks: a landing, a hit on the frame.
@@ -104,8 +105,10 @@ double stands_out(std::span<const double> values, std::size_t i) {
 
 bool is_alone(std::span<const double> values, std::size_t i, double out) {
   const std::size_t begin = std::max<std::size_t>(i, kAround + 1) - kAround, end = std::min(i + kAround + 1, values.size() - 1);
-  for (std::size_t k = begin; k < end; ++k)
+  for (std::size_t k = begin; k < end; ++k) {
+    if (k != i && std::abs(values[k]) > out) return false;
     if ((k + 1 < i || k > i + 1) && kAlone * stands_out(values, k) > out) return false;
+  }
   return true;
 }
 

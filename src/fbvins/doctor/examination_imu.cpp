@@ -60,7 +60,10 @@ void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
   const std::vector<ImuSample>& readings = evidence_.imu;
   const std::vector<Time>& stamps = evidence_.stamps;
-  if (readings.empty() || stamps.empty() || readings.front().t > stamps.back() || readings.back().t < stamps.front()) return;
+  if (readings.empty() || stamps.empty() || readings.front().t > stamps.back() || readings.back().t < stamps.front()) {
+    not_judged("gyroscope, axes, rotation and time between camera and IMU: there are no readings at the time of the images");
+    return;
+  }
   if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
     turns_seen_ = true;
     not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");
