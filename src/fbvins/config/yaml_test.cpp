@@ -126,7 +126,9 @@ TEST(Yaml, RangeNamesLineFieldAndUnit) {
   EXPECT_NE(error_of("klt: {max_features: 99999999999}\n"), "");
 }
 
-TEST(Yaml, RepeatedKeyIsAnError) { EXPECT_EQ(error_of("noise: 0.1\nnoise: 0.2\n"), "f.yaml:2: 'noise' is there twice, first in line 1"); }
+TEST(Yaml, RepeatedKeyIsAnError) {
+  EXPECT_EQ(error_of("noise: 0.1\nnoise: 0.2\n"), "f.yaml:2: 'noise' is there twice, first in line 1");
+}
 
 TEST(Yaml, BrokenTextIsAnErrorWithLine) {
   EXPECT_EQ(error_of("frontend: klt\nklt: [1, 2\n").substr(0, 7), "f.yaml:");
