@@ -19,8 +19,8 @@ constexpr double kLeast_s = 0.0015, kCertain_sigma = 3;
 constexpr double kSuspected_sigma = 1.7;
 /// Before the start one that was found is improved by less.
 constexpr double kImproved_sigma = 1;
-/// Once there was a pose, where it was known well enough for a start, so often in a row, after a loss, too, and the noise of
-/// stamps is a mean of so many solutions: a fault of the gyroscope or of its stamps is no offset.
+/// In flight, where it was known well enough for a start, so often in a row, and the noise of stamps is a mean of so many
+/// solutions: a fault of the gyroscope is no offset.
 constexpr int kInARow = 3, kSolvesOfNoise = 20;
 /// A line delay likewise: global shutters stay what they are. Where the offset was wrong nobody has calibrated the line delay,
 /// either.
@@ -56,7 +56,6 @@ TimeAlignment::TimeAlignment(const StereoRig& rig, bool enabled, const std::opti
 bool TimeAlignment::add(const TrackedFrame& frame, bool running) {
   if (!enabled_) return false;
   now_ = frame.t;
-  flown_ = flown_ || running;
   const bool changed = cut_by_ && std::abs((frame.imu.time_offset - *cut_by_).seconds()) > kStep.seconds();
   cut_by_ = frame.imu.time_offset;
   alignment_.add(frame, given_);
@@ -92,7 +91,7 @@ void TimeAlignment::solve(bool running) {
   suspected_ = off_s > std::max(kLeast_s, kSuspected_sigma * found->time_offset_sigma_s());
   const bool better = found->time_offset_sigma_s() < found_sigma_s_;
   if (off_ == 0) found_sigma_s_ = std::min(found_sigma_s_, found->time_offset_sigma_s());
-  else if (off_ >= (flown_ && found_sigma_s_ < kPreciseForStart_s ? kInARow : 1) && (running || better)) {
+  else if (off_ >= (running && found_sigma_s_ < kPreciseForStart_s ? kInARow : 1) && (running || better)) {
     found_ = Duration::from_seconds(found->time_offset_s());
     found_sigma_s_ = found->time_offset_sigma_s();
   }

@@ -58,7 +58,6 @@ class TimeAlignment {
   Duration given_;
   GyroAlignment alignment_;
   int frames_ = 0;
-  bool flown_ = false;  ///< there has been a pose
   Duration correction_{}, found_{};
   double found_sigma_s_ = kUnknown_s;  ///< of the best solution that agrees with what was found
   double line_delay_s_ = 0, jitter_s_ = 0, sigma_s_ = kUnknown_s;
