@@ -63,8 +63,8 @@ class Ingest final : public SensorInput {
     std::vector<Camera> cameras;           ///< of the rig, by number
     Time newest;                           ///< stamp, on the images' clock
     std::optional<Duration> image_period;  ///< of the frames' stamps
-    std::optional<Time> set_back_at;       ///< when a clock was found to be set back, the last time, on this machine's clock
-    Duration set_back;                     ///< by how much
+    std::optional<Time> set_back_at = {};  ///< when a clock was found to be set back, the last time, on this machine's clock
+    Duration set_back = {};                ///< by how much
   };
   Arrival arrivals() const;
   /// A stamp of the images' clock on this machine's clock (ClockGuard::host_of).
