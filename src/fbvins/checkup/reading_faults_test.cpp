@@ -13,10 +13,7 @@ namespace fbvins {
 namespace reading_faults_test {
 
 std::vector<ImuSample> readings() {
-  const test::Motion motion(0.3, 0.3);
-  std::vector<ImuSample> samples;
-  for (Time t{1'000'000'000}; t.seconds() < 7; t = t + Duration{5'000'000}) samples.push_back(motion.sample(t));
-  return samples;
+  return test::Motion(0.3, 0.3).segment(Time{1'000'000'000}, Time{7'000'000'000}, Duration{5'000'000}).samples;
 }
 
 bool says(const std::vector<Finding>& findings, FindingKind kind) {

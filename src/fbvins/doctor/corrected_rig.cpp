@@ -83,7 +83,7 @@ Result<CorrectedRig> correct_rig(const StereoRig& rig, const Diagnosis& before, 
     return corrected;
   }
   if (std::ranges::find(before.findings, FindingKind::imu_stuck, &Finding::kind) != before.findings.end()) {
-    corrected.why_not = "an axis of the IMU is stuck, from which what else is found may come: mend it and record again";
+    corrected.why_not = "an axis of the IMU is stuck, which may cause the other findings: repair it and record again";
     return corrected;
   }
   if (!concerns_calibration(before)) {

@@ -115,7 +115,7 @@ void Examination::accel_axes(const AccelFit& fit) {
       "with the accelerometer's axes as delivered {:.0f} % of the acceleration that the images show is unexplained, with ({}) {:.0f} %",
       finding.size, axes_text(fit.axes), 100 * fit.unexplained);
   finding.expected = "(x, y, z), as the gyroscope's";
-  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
+  finding.advice = fmt::format("pass ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
 }
 
 /// An IMU that is turned sees the cameras elsewhere, too: where the calibration has them, turned as well, which is more exact

@@ -89,7 +89,7 @@ bool Examination::force_axes() {
       "with the accelerometer's axes as delivered the readings do not predict what the images show, with ({}) they do, to {:.2f} px (with the next best axes {:.2f})",
       axes_text(best.axes), best.error_px, second.error_px);
   finding.expected = "(x, y, z), as the gyroscope's";
-  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(best.axes));
+  finding.advice = fmt::format("pass ({}) as (x, y, z) of the specific force", axes_text(best.axes));
   if (best.axes == Mat3(-Mat3::Identity()))
     finding.advice += ": at rest with z up the accelerometer reads +9.81 along z, what holds it up, not gravity";
   imu_ = with_force(imu_, best.axes);

@@ -174,7 +174,7 @@ void Examination::gyro_axes(const TurnFit& fit) {
   finding.measured =
       fmt::format("the gyroscope fits the images with its axes named ({}) (correlation {:.3f})", axes_text(P), fit.correlation);
   finding.expected = "(x, y, z), and the accelerometer's axes are the body's";
-  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the angular rate", axes_text(P));
+  finding.advice = fmt::format("pass ({}) as (x, y, z) of the angular rate", axes_text(P));
   imu_ = imu_.with_gyro(P);
 }
 
