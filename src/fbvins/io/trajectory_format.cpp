@@ -44,7 +44,7 @@ bool is_whole(std::string_view text) { return text.find_first_not_of("0123456789
 
 /// Whether the first column counts the rows, and stamps follow.
 bool begins_with_number(const std::vector<std::vector<double>>& rows) {
-  if (rows.size() < 2) return false;
+  if (rows.size() < 2 || rows[0].size() < kPose + 1) return false;
   for (std::size_t i = 1; i < rows.size(); ++i)
     if (rows[i].size() < kPose + 1 || rows[i][0] != rows[i - 1][0] + 1 || !(rows[i][1] > rows[i - 1][1])) return false;
   return rows[0][0] == 0 || rows[0][0] == 1;

@@ -152,6 +152,7 @@ TEST(Trajectory, ErrorsNameTheLine) {
   EXPECT_EQ(message("\n1 2 3\n"), "t:2: 3 columns where 8 are needed (1 of 1 rows are unusable)");
   EXPECT_EQ(message("1x,0,0,0,1,0,0,0\n"), "t:1: '1x' is not a stamp in nanoseconds (1 of 1 rows are unusable)");
   EXPECT_EQ(message("1,0,0,0,1,0,0,0,5\n"), "t:1: 9 columns where 8, 11 or at least 17 are needed");
+  EXPECT_NE(message(";;;;;;;;\n1;2;3;4;5;6;7;8;9\n"), "");  // a first row of separators alone
   EXPECT_EQ(read_trajectory("/nowhere").error().message, "/nowhere: no such file");
 }
 
