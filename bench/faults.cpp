@@ -109,6 +109,12 @@ Similarity laid_on(const Pose<AnyWorld, B>& truth, const Pose<W, B>& estimate) {
   return {1, turn, truth.p - turn * estimate.p};
 }
 
+/// Of the direction up in B.
+double tilt_error_rad(const Pose<W, B>& estimate, const Pose<AnyWorld, B>& truth) {
+  const double cosine = (estimate.q.conjugate() * Vec3::UnitZ()).dot(truth.q.conjugate() * Vec3::UnitZ());
+  return std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
 /// Of the whole flight, laid on the truth by the first pose of each W.
 void add_ratios(const Flight& flight, const std::vector<Published>& all, std::FILE* poses, Errors& out) {
   std::optional<Similarity> S;
@@ -122,8 +128,9 @@ void add_ratios(const Flight& flight, const std::vector<Published>& all, std::FI
     const double worst_m = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat3>(covariance, Eigen::EigenvaluesOnly).eigenvalues()(2));
     const double error_m = ((*S * o.T_WB).p - truth->p).norm(), ratio = error_m / worst_m;
     if (poses != nullptr)
-      fmt::print(poses, "{:.3f},{},{},{},{:.4f},{:.4f},{:.3f}\n", (p.taken - flight.begin).seconds(), to_string(o.health.state),
-                 to_string(o.health.reason), o.reset_counter, error_m, worst_m, o.tilt_sigma_rad / kDegree);
+      fmt::print(poses, "{:.3f},{},{},{},{:.4f},{:.4f},{:.3f},{:.3f}\n", (p.taken - flight.begin).seconds(),
+                 to_string(o.health.state), to_string(o.health.reason), o.reset_counter, error_m, worst_m,
+                 o.tilt_sigma_rad / kDegree, tilt_error_rad(o.T_WB, *truth) / kDegree);
     Ratios& ratios = o.health.state == HealthState::good ? out.good_ratios : out.degraded_ratios;
     for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] += ratio >= kRatios[i];
   }
@@ -173,8 +180,7 @@ Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin
     const Pose<W, B> laid = *S * o.T_WB;
     const Vec3 error_W = S->q.conjugate() * (laid.p - truth->p);
     const double size = error_W.norm(), sigma = size / direction_sigma(error_W, o.pose_covariance.topLeftCorner<3, 3>());
-    const double tilt =
-        std::acos(std::clamp((laid.q.conjugate() * Vec3::UnitZ()).dot(truth->q.conjugate() * Vec3::UnitZ()), -1.0, 1.0));
+    const double tilt = tilt_error_rad(o.T_WB, *truth);
     const double tilt_sigma = tilt / o.tilt_sigma_rad;
     out.largest_m = std::max(out.largest_m, size), out.last_m = size;
     if (!good) continue;
@@ -249,7 +255,7 @@ struct Setup {
     app.add_option("--out", out, "CSV; rows that are there are not flown again");
     app.add_option(
         "--poses", poses_out,
-        "every pose: seconds, health, reason, reset counter, error and worst standard deviation in m, tilt's in degrees");
+        "every pose: seconds, health, reason, reset counter, error and worst standard deviation in m, tilt's and its error in degrees");
   }
 };
 

@@ -59,6 +59,8 @@ class ConsistencyMonitor {
   /// A contradiction was seen within the last half second, or nothing explains the images, or gravity has not confirmed the
   /// attitude since.
   bool contradicted() const { return contradicted_ || tilt_.in_doubt() || unexplained_; }
+  /// The accelerometer's bias moves farther than is usual (TiltCheck::suspected).
+  bool bias_suspected() const { return tilt_.suspected(); }
   /// The images are right against the readings, as far as is known.
   bool follows_images() const { return contradicted_; }
   /// The newest image is a contradiction, and not only one within the last half second.

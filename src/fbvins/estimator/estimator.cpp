@@ -251,8 +251,8 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
 }
 
 void Estimator::compare_carried(const Odometry& solved) {
-  carried_.compare(window_,
-                   {solved, gravity_G(), uncertainty_.up_sigma_rad(), reading_noise_.clipped(), monitor_.contradicted()});
+  carried_.compare(window_, {solved, gravity_G(), uncertainty_.up_sigma_rad(), reading_noise_.clipped(), monitor_.contradicted(),
+                             monitor_.bias_suspected()});
 }
 
 /// The pose goes on, but nobody knows any more how it lies in the W of before: told by the reset counter.

@@ -49,10 +49,16 @@ class Estimator {
   /// The state at the frame's stamp; health says whether it may be trusted.
   Estimate process(const TrackedFrame& tracked);
   /// As after `lost`: a new start, in a W placed at the last pose. Before the first start what was gathered for it is forgotten.
-  void start_again() {
-    if (running_) return restart();
-    initialiser_.reset();
-    rest_.reset();
+  /// After a clock was set back the start has to prove itself: until a clock that goes back again is corrected, readings and
+  /// images lie apart.
+  void start_again(bool clock_set_back = false) {
+    if (running_) {
+      restart();
+    } else {
+      initialiser_.reset();
+      rest_.reset();
+    }
+    if (clock_set_back) carried_.dispute();
   }
 
   /// For the frontend: the newest state, in G; not valid before initialisation.

@@ -31,8 +31,9 @@ void PropagatedState::compare(const SlidingWindow& window, const Solved& solved)
   if (disputed_ || (unproven_s_ > 0 && solved.contradicted)) unproven_s_ = kProven_s;
   else unproven_s_ = std::max(0.0, unproven_s_ - step_s_);
   disputed_ = false;
-  if (solved.contradicted && !contradicted_before_) up_.hold();
-  contradicted_before_ = solved.contradicted;
+  const bool doubted = solved.contradicted || solved.bias_suspected;
+  if (doubted && !doubted_before_) up_.hold();
+  doubted_before_ = doubted;
   tilt_away_ = up_.difference(up_B(window), newest.bias.gyro_radps);
   if (solved.clipped) velocity_.forget();
   const Odometry& odometry = solved.odometry;
@@ -57,7 +58,7 @@ void PropagatedState::restart(bool disputed) {
 
 void PropagatedState::begin_window() {
   tilt_away_.reset();
-  contradicted_before_ = false;
+  doubted_before_ = false;
   unproven_s_ = 0;
   covariances_.reset();
 }

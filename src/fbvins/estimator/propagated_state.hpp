@@ -22,8 +22,9 @@ class PropagatedState {
     const Odometry& odometry;  ///< covariances of the newest state
     Vec3 gravity_G;
     double up_sigma_rad = 0;
-    bool clipped = false;       ///< readings at the end of the sensor's range
-    bool contradicted = false;  ///< images and readings contradict each other
+    bool clipped = false;         ///< readings at the end of the sensor's range
+    bool contradicted = false;    ///< images and readings contradict each other
+    bool bias_suspected = false;  ///< the accelerometer's bias moves farther than is usual
   };
 
   /// Readings since the frame before, of every frame.
@@ -34,6 +35,8 @@ class PropagatedState {
   void remember(const SlidingWindow& window, const Odometry& published, bool clipped);
   /// The window is gone. `disputed`: images and readings contradicted each other, and which of them is wrong is unknown.
   void restart(bool disputed);
+  /// The next start is disputed for another reason.
+  void dispute() { disputed_ = true; }
   /// Another window begins.
   void begin_window();
 
@@ -57,11 +60,11 @@ class PropagatedState {
   PropagatedGravity up_;
   PropagatedVelocity velocity_;
   std::optional<PropagatedGravity::Difference>
-      tilt_away_;                     ///< of the window, from what was known before a restart or a contradiction
-  bool contradicted_before_ = false;  ///< images and readings, in the frame before
-  bool disputed_ = false;             ///< the window before was
-  double unproven_s_ = 0;             ///< so long images and readings have to agree in a new one
-  double step_s_ = 0;                 ///< of the newest frame
+      tilt_away_;                ///< of the window, from what was known before a restart or a contradiction
+  bool doubted_before_ = false;  ///< readings or a bias, in the frame before
+  bool disputed_ = false;        ///< the window before was
+  double unproven_s_ = 0;        ///< so long images and readings have to agree in a new one
+  double step_s_ = 0;            ///< of the newest frame
   Time now_;
   std::optional<Covariances> covariances_;  ///< of the newest state that had any
 };

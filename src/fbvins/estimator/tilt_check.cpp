@@ -19,9 +19,13 @@ double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, d
   return std::sqrt((along.array().square() / (gained.eigenvalues().array().abs() + uncertain + floor * floor)).sum());
 }
 
+double accel_sigma(const BiasEstimate& from, const BiasEstimate& to, double least_mps2) {
+  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, least_mps2 / kMoved_sigma,
+                      to.accel.trace() / 3);
+}
+
 bool moved(const BiasEstimate& from, const BiasEstimate& to, double accel_mps2, double gyro_radps) {
-  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma,
-                      to.accel.trace() / 3) > kMoved_sigma ||
+  return accel_sigma(from, to, accel_mps2) > kMoved_sigma ||
          change_sigma(to.bias.gyro_radps - from.bias.gyro_radps, from.gyro, to.gyro, gyro_radps / kMoved_sigma, 0) > kMoved_sigma;
 }
 
@@ -58,6 +62,7 @@ bool TiltCheck::take(const BiasEstimate& now, bool contradicted) {
   while ((now.t - biases_.front().t).seconds() > kJump_s) biases_.pop_front();
   if (refuted_ && (now.t - refuted_->t).seconds() > kRefutedRemembered_s) refuted_.reset(), before_.reset();
   const BiasEstimate& from = refuted_ ? *refuted_ : biases_.front();
+  suspected_ = accel_sigma(from, now, kAccelJump_mps2) > kSuspectedMove_sigma;
   if (moved(from, now, kAccelJump_mps2, kGyroJump_radps)) doubt(from);
   if (!in_doubt_ || contradicted) return false;
   const bool away = before_ && moved(*before_, now, kAccelBack_mps2, kGyroBack_radps);

@@ -35,6 +35,8 @@ class TiltCheck {
   /// Gravity has to confirm the tilt.
   void doubt();
   bool in_doubt() const { return in_doubt_; }
+  /// The accelerometer's bias moves farther than is usual, but not so far that it has to be a fault.
+  bool suspected() const { return suspected_; }
   /// Biases are being found anew, for a reason that is known: those of before confirm and refute nothing.
   void forget_biases() {
     biases_.clear();
@@ -46,7 +48,7 @@ class TiltCheck {
  private:
   void doubt(const BiasEstimate& before);
 
-  bool in_doubt_ = false;
+  bool in_doubt_ = false, suspected_ = false;
   Vec3 tilt_G_ = Vec3::Zero();  ///< of the turns, not confirmed by gravity
   std::optional<Time> begun_;
   std::deque<BiasEstimate> biases_;         ///< of the last two seconds

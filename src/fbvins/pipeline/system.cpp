@@ -124,7 +124,7 @@ struct System::Impl {
 
   void estimate(TrackedFrame frame) {
     if (on_tracked_frame) on_tracked_frame(lenses.any() ? lenses.gathered(frame) : frame);
-    if (start_again.exchange(false) || frame.after_clock_step) estimator.start_again();
+    if (start_again.exchange(false) || frame.after_clock_step) estimator.start_again(frame.after_clock_step);
     Estimate estimate = estimator.process(frame);
     std::uint8_t& without_cameras = estimate.odometry.health.without_cameras;
     without_cameras = lenses.lenses_of(without_cameras);
