@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "fbvins/core/angle.hpp"
 #include "fbvins/types/protection.hpp"
@@ -48,6 +49,23 @@ TEST(Estimator, ARestartForgetsWhatWasEstimatedOfTheCalibration) {
     changed = changed || estimator.calibration().T_BC0().p != given.T_BC0().p;
   EXPECT_TRUE(changed);
   EXPECT_EQ(estimator.calibration().T_BC0().p, given.T_BC0().p);
+}
+
+TEST(Estimator, AStartAfterAClockWasSetBackHasToProveItself) {
+  for (const bool clock_set_back : {false, true}) {
+    SimulatedFlight flight(Motion(0.6, 0.3), 8);
+    Estimator estimator(flight.rig, exact_noise());
+    for (int k = 0; k < 80; ++k) (void)estimator.process(flight.frame(k));
+    estimator.start_again(clock_set_back);
+    std::vector<Health> with_pose;
+    for (int k = 80; k < 160; ++k)
+      if (const Health health = estimator.process(flight.frame(k)).odometry.health; health.has_pose())
+        with_pose.push_back(health);
+    ASSERT_GT(with_pose.size(), 30u);
+    for (int k = 0; k < 19; ++k)  // a second of agreement
+      EXPECT_EQ(with_pose[k].reason, clock_set_back ? HealthReason::contradiction : HealthReason::none) << k;
+    EXPECT_EQ(with_pose[25].state, HealthState::good);
+  }
 }
 
 TEST(Estimator, BridgesHalfASecondWithoutReadings) {

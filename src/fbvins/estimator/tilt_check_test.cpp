@@ -51,6 +51,19 @@ TEST(TiltCheck, ABiasThatStaysAwayRefutesIt) {
   }
 }
 
+TEST(TiltCheck, AMoveThatIsUnusualIsSuspectedAndNoDoubt) {
+  Flight flight;
+  flight.fly(4);
+  EXPECT_FALSE(flight.check.suspected());
+  flight.fly(0.2, kBias + Vec3(0.12, 0, 0));  // 2.4 standard deviations
+  EXPECT_FALSE(flight.check.suspected());
+  flight.fly(0.2, kBias + Vec3(0.2, 0, 0));  // 3.9
+  EXPECT_TRUE(flight.check.suspected());
+  EXPECT_FALSE(flight.check.in_doubt());
+  flight.fly(3, kBias + Vec3(0.2, 0, 0));
+  EXPECT_FALSE(flight.check.suspected()) << "it does not move any more";
+}
+
 TEST(TiltCheck, NothingIsConfirmedDuringAContradiction) {
   Flight flight;
   flight.fly(4);
