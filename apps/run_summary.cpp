@@ -161,7 +161,7 @@ RunSummary summarise(const RunRecord& record, const Dataset& data) {
   for (const FrameEntry& frame : data.frames()) images.push_back(frame.t);
   RunSummary s = summarise(record, std::move(images), truth_of(data, time_offset_found_s(record)));
   s.dataset = data.info().name;
-  s.images_bad = data.info().camera(0).images.bad() + data.info().camera(1).images.bad();
+  for (const auto& camera : data.info().cameras) s.images_bad += camera.images.bad();
   return s;
 }
 
