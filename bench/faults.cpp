@@ -58,8 +58,7 @@ class LiveWay final : public SensorInput {
  public:
   LiveWay(const Flight& flight, const SystemOptions& options, SystemParts parts)
       : ingest_(
-            LiveOptions{}, 1, [this] { return now; }, nullptr, flight.rig.imu_noise,
-            Duration::from_seconds(flight.rig.time_offset_s)),
+            1, [this] { return now; }, nullptr, flight.rig.imu_noise, Duration::from_seconds(flight.rig.time_offset_s)),
         system_(*System::create(options, flight.rig, RunMode::deterministic, std::move(parts))) {
     system_.on_odometry([this](const Odometry& o) { published.push_back({taken_.at(o.t.ns), o}); });
   }

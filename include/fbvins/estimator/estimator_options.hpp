@@ -14,18 +14,14 @@ enum class KeyframeLeaving { oldest, entropy };
 
 struct KeyframeOptions {
   int max_keyframes = 8;
-  int newest_frames = 3;
+  int newest_frames = 3;  ///< kept beside them, keyframes or not; set by tests
   KeyframeLeaving leaving = KeyframeLeaving::oldest;
-  double min_parallax_px = 12;
 
   template <class V>
   void visit(V&& v) {
     v("max_keyframes", max_keyframes, "", "keyframes in the sliding window", 3, 30);
-    v("newest_frames", newest_frames, "", "newest frames kept beside them, keyframes or not", 2, 10);
     v("leaving", leaving, "oldest|entropy",
       "which keyframe leaves a full window: the oldest, or the one with the least information on the newest (paper 2.1.2)");
-    v("min_parallax_px", min_parallax_px, "px", "median rotation-free image motion since the last keyframe that makes a new one",
-      0.5, 100.0);
   }
 };
 

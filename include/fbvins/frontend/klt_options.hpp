@@ -9,8 +9,8 @@ struct KltFrontendOptions {
   double min_distance_px = 22;
   double epipolar_px = 0.7;
   double sigma_px = 0.6;
-  double min_depth_m = 0.35;
-  double max_gap_s = 0.6;  ///< after a longer gap without left images all tracks are dropped; set by tests
+  double min_depth_m = 0.35;  ///< smallest depth that is searched for in the right image; set by tests
+  double max_gap_s = 0.6;     ///< after a longer gap without left images all tracks are dropped; set by tests
 
   template <class V>
   void visit(V&& v) {
@@ -20,7 +20,6 @@ struct KltFrontendOptions {
       4.0, 200.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
-    v("min_depth_m", min_depth_m, "m", "smallest depth that is searched for in the right image", 0.05, 10.0);
   }
 };
 

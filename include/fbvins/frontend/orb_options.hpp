@@ -7,12 +7,11 @@ namespace fbvins {
 /// Landmarks re-observed after they were out of view.
 struct RecognitionOptions {
   bool enabled = true;
-  int capacity = 3000;
+  int capacity = 3000;  ///< landmarks remembered; set by tests
 
   template <class V>
   void visit(V&& v) {
     v("enabled", enabled, "", "re-observe landmarks, however long they were out of view");
-    v("capacity", capacity, "", "landmarks remembered", 0, 100000);
   }
 };
 
@@ -24,7 +23,7 @@ struct OrbFrontendOptions {
   double search_px = 12;  ///< radius around a prediction from the estimator's state; set by tests
   double epipolar_px = 1.0;
   double sigma_px = 0.6;
-  double min_depth_m = 0.35;
+  double min_depth_m = 0.35;        ///< smallest depth that is searched for in the right image; set by tests
   double stereo_epipolar_px = 1.5;  ///< largest distance of a match from the right epipolar line; set by tests
   RecognitionOptions recognition = {};
 
@@ -36,7 +35,6 @@ struct OrbFrontendOptions {
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
-    v("min_depth_m", min_depth_m, "m", "smallest depth that is searched for in the right image", 0.05, 10.0);
     v.group("recognition", recognition, "landmarks re-observed after they were out of view");
   }
 };

@@ -17,16 +17,11 @@ struct PlaceExtractorOptions {
 };
 
 /// Whether two keyframes show the same place.
+/// Whether two keyframes show the same place (L7); set by tests.
 struct PlaceVerifierOptions {
-  int min_inliers = 28;
-  double min_visible_share = 0.16;
-  int max_distance_bit = 72;  ///< largest Hamming distance of a match
-
-  template <class V>
-  void visit(V&& v) {
-    v("min_inliers", min_inliers, "", "inliers of an accepted pose", 4, 1000);
-    v("min_visible_share", min_visible_share, "", "inliers out of the candidate's points that should be visible", 0.0, 1.0);
-  }
+  int min_inliers = 28;             ///< of an accepted pose
+  double min_visible_share = 0.16;  ///< inliers out of the candidate's points that should be visible
+  int max_distance_bit = 72;        ///< largest Hamming distance of a match
 };
 
 /// How fast the odometry may drift where its covariance is not known: standard deviations after a metre, which grow with the root
@@ -42,8 +37,6 @@ struct LoopOptions {
   DriftOptions drift;
   double max_distance_m = 4;  ///< places farther than this from the predicted position are not tried; set by tests
   double gate_sigma = 5;      ///< a recognised place farther than this from the odometry's prediction is refused; set by tests
-  double follow_mps = 0.15;
-  double follow_radps = 3 * kDegree;
   int thin_above = 600;
   int max_keyframes = 3000;
   int memory_mb = 200;
@@ -55,10 +48,7 @@ struct LoopOptions {
     v("memory_mb", memory_mb, "MB", "features of a loaded map in memory at most; others are read from its file when needed", 0,
       1000000);
     v("thin_above", thin_above, "", "keyframes above which redundant ones are removed", 10, 1000000);
-    v("follow_mps", follow_mps, "m/s", "fastest motion of the smooth T_MW", 0.001, 100.0);
-    v("follow_radps", follow_radps, "rad/s", "fastest turn of the smooth T_MW", 1e-4, 20.0);
     v.group("extraction", extraction, "features of a keyframe");
-    v.group("verification", verification, "whether two keyframes show the same place");
   }
 };
 

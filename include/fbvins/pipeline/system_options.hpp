@@ -4,20 +4,17 @@
 
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/frontend/frontend_options.hpp"
-#include "fbvins/pipeline/input_options.hpp"
 
 namespace fbvins {
 
 struct SystemOptions {
   FrontendOptions frontend;
   EstimatorOptions estimator;
-  InputOptions input;
 
   template <class V>
   void visit(V&& v) {
     v.group("frontend", frontend, "features and their tracks");
     v.group("estimator", estimator, "sliding window");
-    v.group("input", input, "how images and IMU readings are joined");
   }
 };
 

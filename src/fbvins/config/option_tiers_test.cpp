@@ -30,7 +30,7 @@ TEST(OptionTiers, ThereAreFewEnoughToRead) {
   EXPECT_LE(user_options().size(), 16u);
   // Seventeen for a flight controller, ten of names, clock, transforms, commands and quality of service for ROS 2, eleven of the
   // sensors that aid images and IMU.
-  EXPECT_LE(values_of(fields_of(config)).size(), 91u);
+  EXPECT_LE(values_of(fields_of(config)).size(), 80u);
 }
 
 TEST(OptionTiers, AGroupIsShownOnlyWithAUserOption) {

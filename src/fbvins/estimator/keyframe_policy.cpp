@@ -15,6 +15,8 @@ namespace {
 constexpr int kTooNewToJudge = 2;
 /// A new keyframe when fewer of the features than this were seen by the last one.
 constexpr double kMinSharedRatio = 0.7;
+/// A new keyframe when the images have moved by so much since, rotation left out, in the median.
+constexpr double kMinParallax_px = 12;
 /// A new keyframe after this time at the latest; at rest, where the view stays the same, only so that the readings since the
 /// last one stay few.
 constexpr double kMaxInterval_s = 1.0, kMaxIntervalAtRest_s = 10.0;
@@ -24,7 +26,7 @@ constexpr double kMaxInterval_s = 1.0, kMaxIntervalAtRest_s = 10.0;
 bool KeyframePolicy::is_keyframe(const SlidingWindow& window, const Calibration& calibration, bool standstill) const {
   const KeyframeDistance d = distance_to_last_keyframe(window, calibration, focal_px_);
   if (standstill) return d.age.seconds() > kMaxIntervalAtRest_s;
-  return d.shared_ratio < kMinSharedRatio || d.parallax_px > options_.min_parallax_px || d.age.seconds() > kMaxInterval_s;
+  return d.shared_ratio < kMinSharedRatio || d.parallax_px > kMinParallax_px || d.age.seconds() > kMaxInterval_s;
 }
 
 int KeyframePolicy::leaving(const SlidingWindow& window, const Calibration& calibration, int keyframes) {

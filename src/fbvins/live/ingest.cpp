@@ -10,6 +10,8 @@ namespace {
 
 /// Readings kept until it is known whether their stamps are good.
 constexpr std::size_t kMostMisfits = 2000;
+/// Longest wait for a missing reading.
+constexpr Duration kReorderWait{10'000'000};
 /// Anchors that wait for the next event; more come from a sensor gone mad.
 constexpr std::size_t kMostAnchors = 1024;
 /// An image that repeats the one before is the same one, come twice, if its stamp is no later than this; otherwise the camera is
@@ -18,13 +20,12 @@ constexpr Duration kSameImage{10'000'000};
 
 }  // namespace
 
-Ingest::Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu,
-               Duration time_offset, int cameras)
+Ingest::Ingest(double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu, Duration time_offset, int cameras)
     : now_(std::move(now)),
       on_reading_(std::move(on_reading)),
       time_offset_(time_offset),
       clock_(clock_rate),
-      order_(Duration::from_seconds(options.imu_reorder_wait_s)),
+      order_(kReorderWait),
       judge_(imu),
       cameras_(static_cast<std::size_t>(cameras)) {
   arrivals_.cameras.resize(cameras_.size());

@@ -21,7 +21,6 @@
 #include "fbvins/live/frozen_camera.hpp"
 #include "fbvins/live/imu_order.hpp"
 #include "fbvins/live/live_event.hpp"
-#include "fbvins/live/live_options.hpp"
 #include "fbvins/live/source.hpp"
 
 namespace fbvins {
@@ -33,8 +32,8 @@ class Ingest final : public SensorInput {
 
   /// `now` is this machine's clock. `on_reading` gets each reading in order, at once, on the thread that brought it,
   /// with its time on this machine's clock; it must not call back. time_offset: t_imu = t_image + offset. `cameras`: of the rig.
-  Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu = {},
-         Duration time_offset = {}, int cameras = 2);
+  Ingest(double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu = {}, Duration time_offset = {},
+         int cameras = 2);
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;

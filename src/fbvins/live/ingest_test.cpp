@@ -19,7 +19,7 @@ ImuSample reading(std::int64_t t_ms) { return {ms(t_ms), Vec3::Constant(1e-4 * s
 struct Fixture {
   Time now = ms(1000);
   std::vector<Time> told;
-  Ingest ingest{LiveOptions{}, 1, [this] { return now; }, [this](const ImuSample& s, Time) { told.push_back(s.t); }};
+  Ingest ingest{1, [this] { return now; }, [this](const ImuSample& s, Time) { told.push_back(s.t); }};
 
   /// `stamp_ms`: instead of the time of arrival.
   void read(std::int64_t t_ms, std::optional<std::int64_t> stamp_ms = {}) {
@@ -132,7 +132,7 @@ void begin(Ingest& ingest, Time& now) {
 TEST(Ingest, EveryCameraIsWatched) {
   Time now = ms(1000);
   Ingest ingest(
-      LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 4);
+      1, [&] { return now; }, {}, {}, {}, 4);
   begin(ingest, now);
   for (std::int64_t t = 0; t <= 400; t += 50) {
     now = ms(1000 + t);
@@ -161,7 +161,7 @@ TEST(Ingest, EveryCameraIsWatched) {
 TEST(Ingest, CamerasMayDeliverAlone) {
   Time now = ms(1000);
   Ingest one(
-      LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 1),
+      1, [&] { return now; }, {}, {}, {}, 1),
       three(
           LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 3);
   begin(one, now), begin(three, now);
@@ -271,7 +271,7 @@ TEST(Ingest, ReadingsAreOnTheImagesClock) {
   Time now = ms(1000);
   std::vector<Time> stamps, host;
   Ingest ingest(
-      LiveOptions{}, 1, [&] { return now; }, [&](const ImuSample& s, Time t) { stamps.push_back(s.t), host.push_back(t); }, {},
+      1, [&] { return now; }, [&](const ImuSample& s, Time t) { stamps.push_back(s.t), host.push_back(t); }, {},
       Duration{-50'000'000});
   for (std::int64_t t = 0; t < 1000; t += 5) {
     now = ms(1000 + t);
@@ -284,7 +284,7 @@ TEST(Ingest, ReadingsAreOnTheImagesClock) {
 
 TEST(Ingest, TwoThreadsMayPush) {
   // Everything arrives at once and a second late: no stamp is ahead of its arrival.
-  Ingest ingest(LiveOptions{}, 1, [] { return ms(5000); }, {});
+  Ingest ingest(1, [] { return ms(5000); }, {});
   std::jthread imu([&] {
     for (std::int64_t t = 4001; t <= 6000; ++t) ingest.push(reading(t));
   });

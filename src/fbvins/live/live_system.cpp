@@ -35,7 +35,7 @@ struct LiveSystem::Impl {
        std::uint32_t first_reset_counter, System made)
       : first_reset(first_reset_counter),
         ingest(
-            options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
+            clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
             Duration::from_seconds(rig.time_offset_s), rig.camera_count()),
         system(std::move(made)),
         estimate(PosePropagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),

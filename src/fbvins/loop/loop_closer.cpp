@@ -24,6 +24,9 @@ constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
 /// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
 constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
 
+/// Fastest motion and turn of the smooth T_MW (L14).
+constexpr double kFollow_mps = 0.15, kFollow_radps = 3 * kDegree;
+
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
 
 /// Places belong to the camera; another rig may have its body elsewhere.
@@ -50,7 +53,7 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
       map_(with_body(std::move(map), cameras_.T_BC(0))),
       search_(vocabulary.words(), options.max_distance_m),
       join_(map_),
-      follower_(options.follow_mps, options.follow_radps),
+      follower_(kFollow_mps, kFollow_radps),
       thinning_(options.thin_above, options.max_keyframes, map_) {
   map_.fill_words(vocabulary);
   if (map_.store) search_.add(map_.store);

@@ -6,6 +6,9 @@
 namespace fbvins {
 namespace {
 
+/// An image is processed without its readings once newer images are ahead by this.
+constexpr double kMostImuWait_s = 0.25;
+
 /// Readings that a correction of the time offset may need again.
 constexpr Duration kMostCorrection{100'000'000};
 
@@ -38,7 +41,7 @@ void PacketMaker::push(const AidingSample& reading) {
 bool PacketMaker::is_ready(bool flush) const {
   if (waiting_.empty()) return false;
   const Time t = waiting_.front().t;
-  const bool waited_long = (*newest_image_ - t).seconds() > options_.max_imu_wait_s;
+  const bool waited_long = (*newest_image_ - t).seconds() > kMostImuWait_s;
   return imu_.covers(t) || flush || waited_long;
 }
 

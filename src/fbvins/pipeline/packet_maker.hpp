@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "fbvins/imu/imu_history.hpp"
-#include "fbvins/pipeline/input_options.hpp"
 #include "fbvins/types/input_counts.hpp"
 #include "fbvins/types/tracking.hpp"
 
@@ -17,8 +16,8 @@ namespace fbvins {
 class PacketMaker {
  public:
   /// time_offset: t_imu = t_image + offset. What comes out is on the images' clock.
-  PacketMaker(const InputOptions& options, const ImuNoise& imu, Duration time_offset)
-      : options_(options), imu_(imu, time_offset), given_(time_offset), time_offset_(time_offset) {}
+  PacketMaker(const ImuNoise& imu, Duration time_offset)
+      : imu_(imu, time_offset), given_(time_offset), time_offset_(time_offset) {}
 
   void push(const ImuSample& sample) { imu_.add(sample); }
   void push(StereoFrame frame);
@@ -37,7 +36,6 @@ class PacketMaker {
  private:
   bool is_ready(bool flush) const;
 
-  InputOptions options_;
   ImuHistory imu_;
   Duration given_, time_offset_;
   std::deque<StereoFrame> waiting_;

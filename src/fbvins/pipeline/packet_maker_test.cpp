@@ -25,9 +25,7 @@ std::vector<SensorPacket> drain(PacketMaker& maker, bool flush = false) {
   return packets;
 }
 
-PacketMaker make(double time_offset_s = 0) {
-  return PacketMaker(InputOptions{}, ImuNoise{}, Duration::from_seconds(time_offset_s));
-}
+PacketMaker make(double time_offset_s = 0) { return PacketMaker(ImuNoise{}, Duration::from_seconds(time_offset_s)); }
 
 TEST(PacketMaker, AnImageWaitsForTheReadingsUpToItsStamp) {
   PacketMaker maker = make();

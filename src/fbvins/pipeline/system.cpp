@@ -90,7 +90,7 @@ struct System::Impl {
       : mode(mode_wanted),
         own_offsets(fbvins::own_offsets(rig)),
         lenses(std::move(lenses_of_rig)),
-        packet_maker(options.input, lenses.rig().imu_noise, Duration::from_seconds(lenses.rig().time_offset_s)),
+        packet_maker(lenses.rig().imu_noise, Duration::from_seconds(lenses.rig().time_offset_s)),
         frontend(std::move(parts.frontend)),
         estimator(lenses.rig(), options.estimator, parts.imu_state, parts.sensors),
         mapper(parts.mapper),
