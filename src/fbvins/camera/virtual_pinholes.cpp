@@ -176,9 +176,11 @@ StereoFrame VirtualPinholes::spread(StereoFrame frame) const {
 TrackedFrame VirtualPinholes::gathered(TrackedFrame frame) const {
   for (TrackedFeature& feature : frame.features) {
     feature.lead = lens_of(feature.lead);
-    for (Observation& o : feature.seen) {
+    const auto seen = std::exchange(feature.seen, {});
+    for (Observation o : seen) {
       o.pixel += origin_px(o.camera);
-      o.camera = lens_of(o.camera);
+      if (feature.by(lens_of(o.camera)) == nullptr)
+        feature.see(lens_of(o.camera), o);  // where two faces of a lens meet, the first
     }
   }
   frame.cameras.resize(std::min(frame.cameras.size(), lenses_.cameras.size()));

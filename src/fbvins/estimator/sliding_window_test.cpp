@@ -266,6 +266,30 @@ TEST(SlidingWindow, ARightOutlierLeavesTheLeftObservation) {
   EXPECT_EQ(s.landmark(4)->newest().front().seen.camera, 0);
 }
 
+TEST(SlidingWindow, WhatSeveralCamerasSeeIsAllThere) {
+  const auto flown = [](const Vec2& left_shift, double third_shift) {
+    Scene s;
+    s.calibration.cameras.push_back({Quat::Identity(), Vec3(0, -kBaseline_m, 0)});  // above the left one
+    for (int k = 0; k < 3; ++k) {
+      std::vector<TrackedFeature> features = s.all(k);
+      if (k == 2) features[4] = s.feature(4, k, true, left_shift);
+      for (TrackedFeature& f : features) {
+        const Vec3 p_B = state_at(k).T_FB.inverse() * s.points_G.at(static_cast<int>(f.id.value));
+        f.see(2, seen_at(s.calibration.T_BC(2).inverse() * p_B));
+      }
+      if (k == 2) features[4].by(2)->normalised.x() += third_shift;
+      s.add(k, features);
+    }
+    EXPECT_EQ(s.fill_problem().observations.size(), 3 * 3 * s.points_G.size());
+    EXPECT_LT((s.position_G(4) - s.points_G[4]).norm(), 1e-9);
+    s.window.remove_outliers(s.problem);
+    return s.landmark(4)->seen_by_cameras(FrameId{2}).size();
+  };
+  EXPECT_EQ(flown(Vec2::Zero(), 0), 3u);
+  EXPECT_EQ(flown(Vec2::Zero(), 0.05), 2u) << "the other two stay";
+  EXPECT_EQ(flown(Vec2(0, 0.05), 0), 0u) << "the others were found from the lead";
+}
+
 /// Keyframes 0 and 1, then three newest frames; track 0 is seen by the keyframes alone, track 1 by all.
 Scene about_to_shrink() {
   Scene s;
