@@ -29,9 +29,6 @@ std::vector<CameraGroup> camera_groups(const StereoRig& rig);
 /// pair whose first one does not see most of what it sees.
 std::vector<CameraGroup> leading_groups(const StereoRig& rig);
 
-/// Of a group of leading_groups: the cameras beside its second one that see a third of what its first one's image shows.
-std::vector<int> further_partners(const StereoRig& rig, const CameraGroup& group);
-
 /// Whether any two cameras overlap, or there is a depth sensor, so that depth is seen without motion.
 bool has_stereo(const StereoRig& rig);
 

@@ -59,14 +59,6 @@ std::vector<CameraGroup> leading_groups(const StereoRig& rig) {
   return groups;
 }
 
-std::vector<int> further_partners(const StereoRig& rig, const CameraGroup& group) {
-  std::vector<int> partners;
-  for (int camera = 0; camera < rig.camera_count(); ++camera)
-    if (camera != group.first && camera != group.second && overlap(rig, group.first, camera) > kLeastOverlap)
-      partners.push_back(camera);
-  return partners;
-}
-
 bool has_stereo(const StereoRig& rig) {
   return rig.depth || std::ranges::any_of(camera_groups(rig), [](const CameraGroup& group) { return group.second.has_value(); });
 }

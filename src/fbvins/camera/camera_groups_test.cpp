@@ -56,16 +56,6 @@ TEST(CameraGroups, ACameraWithoutAPartnerIsAlone) {
   EXPECT_EQ(numbers(with_one_camera(rig)), (Numbers{{0, -1}}));
 }
 
-TEST(CameraGroups, ACameraHasMorePartnersThanOne) {
-  StereoRig rig = two_pairs();
-  EXPECT_TRUE(further_partners(rig, {0, 1}).empty());
-  rig.cameras.push_back({camera(), {Quat::Identity(), Vec3(0, -0.1, 0)}});  // above camera 0
-  EXPECT_EQ(numbers(rig), (Numbers{{0, 1}, {2, 3}, {4, -1}}));
-  EXPECT_EQ(further_partners(rig, {0, 1}), std::vector<int>{4});
-  EXPECT_EQ(further_partners(rig, {4, std::nullopt}), (std::vector<int>{0, 1}));
-  EXPECT_TRUE(further_partners(rig, {2, 3}).empty());
-}
-
 TEST(CameraGroups, ImagesThatAreTurnedOverlap) {
   StereoRig rig = two_pairs();
   rig.cameras.resize(2);

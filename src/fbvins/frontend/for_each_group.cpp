@@ -8,7 +8,6 @@
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/frontend/any_rig.hpp"
 #include "fbvins/frontend/either_camera.hpp"
-#include "fbvins/frontend/further_partners.hpp"
 #include "fbvins/frontend/generic_lead.hpp"
 #include "fbvins/frontend/rig_frontend.hpp"
 
@@ -26,7 +25,7 @@ std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, int max_features,
     else frontends.push_back(lead(cameras));
   }
   if (groups.size() == 1) return std::move(frontends.front());
-  return std::make_unique<RigFrontend>(groups, std::move(frontends), max_features, FurtherPartners(rig, groups));
+  return std::make_unique<RigFrontend>(groups, std::move(frontends), max_features);
 }
 
 std::unique_ptr<Frontend> for_any_rig(const StereoRig& rig, int max_features, FrontendOfPair make) {

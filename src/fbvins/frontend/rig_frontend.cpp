@@ -33,12 +33,8 @@ void add(FrontendStats& sum, const FrontendStats& of_group) {
 
 }  // namespace
 
-RigFrontend::RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends, int max_features,
-                         FurtherPartners partners)
-    : groups_(std::move(groups)),
-      frontends_(std::move(frontends)),
-      budget_(max_features, groups_.size()),
-      partners_(std::move(partners)) {}
+RigFrontend::RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends, int max_features)
+    : groups_(std::move(groups)), frontends_(std::move(frontends)), budget_(max_features, groups_.size()) {}
 
 TrackId RigFrontend::rig_wide(TrackId id, std::size_t group) const {
   return TrackId{id.value * static_cast<std::int64_t>(groups_.size()) + static_cast<std::int64_t>(group)};
@@ -58,7 +54,6 @@ TrackedFrame RigFrontend::process(const SensorPacket& packet, const StatePrior& 
     take_features(std::move(frame.features), k, out.features);
     add(out.stats, frame.stats);
   }
-  partners_.match(packet.frame, out.features, out.stats);
   return out;
 }
 

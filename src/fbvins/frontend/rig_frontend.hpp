@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The frontend of a rig with more cameras than one pair: a frontend for each group of cameras, whose features are one list, and
-// whose number of features is the rig's; other cameras that overlap with a group see them as well. A track stays with its group.
-// Tracks are numbered so that the number tells the group. Synchronous; one instance is used by one thread at a time.
+// whose number of features is the rig's. A track stays with its group. Tracks are numbered so that the number tells the group.
+// Synchronous; one instance is used by one thread at a time.
 //
 //   RigFrontend frontend(camera_groups(rig), frontends, 150);   // one for each group, for rig_of(rig, group)
 #pragma once
@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "fbvins/camera/camera_groups.hpp"
-#include "fbvins/frontend/further_partners.hpp"
 #include "fbvins/frontend/track_budget.hpp"
 #include "fbvins/frontend/track_transfer.hpp"
 
@@ -19,8 +18,7 @@ namespace fbvins {
 class RigFrontend final : public Frontend {
  public:
   /// `max_features`: that a rig of one group would follow.
-  RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends, int max_features,
-              FurtherPartners partners = {});
+  RigFrontend(std::vector<CameraGroup> groups, std::vector<std::unique_ptr<Frontend>> frontends, int max_features);
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
   void locate(const LandmarkUpdate& update) override;
@@ -32,7 +30,6 @@ class RigFrontend final : public Frontend {
   std::vector<CameraGroup> groups_;
   std::vector<std::unique_ptr<Frontend>> frontends_;
   TrackBudget budget_;
-  FurtherPartners partners_;
 };
 
 }  // namespace fbvins
