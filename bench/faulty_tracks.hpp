@@ -80,13 +80,17 @@ class FaultyTracks final : public Frontend {
     out.cameras = {packet.frame.left() != nullptr, packet.frame.right() != nullptr};
     for (TrackedFeature& f : out.features) {
       const TrackedFeature seen = f;
-      f.left = left ? (left->right ? seen.right : seen.left) : std::nullopt;
-      f.right = right ? (right->right ? seen.right : seen.left) : std::nullopt;
+      f.seen.clear();
+      const auto see = [&](int camera, bool as_right) {
+        if (const Observation* o = seen.by(as_right)) f.see(camera, *o);
+      };
+      if (left) see(0, left->right);
+      if (right) see(1, right->right);
       if (fault_ && active(out.t)) spoil(f);
     }
-    std::erase_if(out.features, [](const TrackedFeature& f) { return !f.left && !f.right; });
+    std::erase_if(out.features, [](const TrackedFeature& f) { return f.seen.empty(); });
     out.stats.stereo = 0;
-    for (const TrackedFeature& f : out.features) out.stats.stereo += f.left && f.right;
+    for (const TrackedFeature& f : out.features) out.stats.stereo += f.by_several();
     return out;
   }
   void locate(const LandmarkUpdate& update) override { tracks_.locate(update); }
@@ -110,32 +114,32 @@ class FaultyTracks final : public Frontend {
     const auto lower = [&](const Vec2& px) { return Vec2(px.x(), px.y() + amount); };
     for (const int camera : {0, 1}) {
       if (fault_->camera != kAllCameras && fault_->camera != camera) continue;
-      std::optional<Observation>& o = camera == 0 ? f.left : f.right;
+      Observation* o = f.by(camera);
+      if (!o) continue;
       const Camera& lens = flight_.rig.camera(camera);
+      bool is_seen = true;
       switch (fault_->image) {
-        case ImageFault::covered: cover(o); break;
-        case ImageFault::scroll: move(o, lens, scrolled); break;
-        case ImageFault::shifted: move(o, lens, lower); break;
-        case ImageFault::turned: move(o, lens, turn); break;
+        case ImageFault::covered: is_seen = o->pixel.x() >= fault_->amount * w; break;
+        case ImageFault::scroll: is_seen = move(*o, lens, scrolled); break;
+        case ImageFault::shifted: is_seen = move(*o, lens, lower); break;
+        case ImageFault::turned: is_seen = move(*o, lens, turn); break;
         default: break;
       }
+      if (!is_seen) f.forget(camera);
     }
   }
 
-  void cover(std::optional<Observation>& o) const {
-    if (o && o->pixel.x() < fault_->amount * flight_.rig.left().width()) o.reset();
-  }
-
+  /// Whether it is still in the image.
   template <class To>
-  void move(std::optional<Observation>& o, const Camera& camera, To&& to) const {
-    if (!o) return;
-    o->pixel = to(o->pixel);
-    const auto ray = camera.inside(o->pixel, 16) ? camera.undistort(o->pixel) : std::nullopt;
-    if (!ray) return o.reset();
-    o->normalised = *ray;
+  bool move(Observation& o, const Camera& camera, To&& to) const {
+    o.pixel = to(o.pixel);
+    const auto ray = camera.inside(o.pixel, 16) ? camera.undistort(o.pixel) : std::nullopt;
+    if (!ray) return false;
+    o.normalised = *ray;
     Mat2 J;
-    (void)camera.distort(o->normalised, &J);
-    o->sqrt_information = J / sigma_px_;
+    (void)camera.distort(o.normalised, &J);
+    o.sqrt_information = J / sigma_px_;
+    return true;
   }
 
   const Simulation& flight_;

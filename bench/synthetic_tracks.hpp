@@ -147,10 +147,10 @@ class SyntheticTracks {
     TrackedFeature f;
     f.id = track.id;
     f.age_frames = track.age;
-    f.left = left;
-    if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right(), now.T_C1W * p_W, track.slide);
+    f.see(0, left);
+    if (rng_.uniform() < 0.9) f.see(1, observe(flight_.rig.right(), now.T_C1W * p_W, track.slide));
     out.stats.tracked += track.age > 0;
-    out.stats.stereo += f.right.has_value();
+    out.stats.stereo += f.by_several();
     if (track.age > 0) motion_px_.push_back((left.pixel - track.seen_at).norm());
     track.seen_at = left.pixel;
     ++track.age;

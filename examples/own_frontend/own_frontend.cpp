@@ -62,10 +62,12 @@ class BlockFrontend final : public Frontend {
     if (before_) follow(*left, rotation_since(packet, prior));
     detect(*left);
     for (Track& track : tracks_) {
-      std::optional<Observation> seen = observe(rig_.left(), track.px, kSigma_px);
+      const std::optional<Observation> seen = observe(rig_.left(), track.px, kSigma_px);
       if (!seen) continue;
-      out.features.push_back(
-          {track.id, seen, packet.frame.right() ? in_right(track, *left, *packet.frame.right()) : std::nullopt, track.age++});
+      TrackedFeature feature{track.id, track.age++};
+      feature.see(0, seen);
+      if (packet.frame.right()) feature.see(1, in_right(track, *left, *packet.frame.right()));
+      out.features.push_back(feature);
     }
     before_ = left;
     return out;

@@ -40,8 +40,7 @@ class PyFrontend final : public Frontend {
       TrackedFrame out;
       const nb::object found = frontend_->get().attr("process")(packet, prior);
       if (!found.is_none()) out.features = features(found);
-      out.stats.stereo =
-          static_cast<int>(std::ranges::count_if(out.features, [](const TrackedFeature& f) { return f.right.has_value(); }));
+      out.stats.stereo = static_cast<int>(std::ranges::count_if(out.features, &TrackedFeature::by_several));
       return out;
     });
   }
@@ -57,9 +56,10 @@ class PyFrontend final : public Frontend {
     if (const nb::object given = found[2]; !given.is_none()) right = checked<double>(given, "right", {n, 2});
     std::vector<TrackedFeature> out;
     for (std::int64_t i = 0; i < n; ++i) {
-      TrackedFeature feature{TrackId{ids.data[i]}, seen(rig_.left(), left.data + 2 * i), std::nullopt};
-      if (right && rig_.has_right()) feature.right = seen(rig_.right(), right->data + 2 * i);
-      if (feature.left || feature.right) out.push_back(feature);
+      TrackedFeature feature{TrackId{ids.data[i]}};
+      feature.see(0, seen(rig_.left(), left.data + 2 * i));
+      if (right && rig_.has_right()) feature.see(1, seen(rig_.right(), right->data + 2 * i));
+      if (!feature.seen.empty()) out.push_back(feature);
     }
     return out;
   }

@@ -68,7 +68,7 @@ struct Hand {
         if (p.z() < 0.5 || std::abs(pixel.x()) > 320 || std::abs(pixel.y()) > kMiddle_px) continue;
         TrackedFeature f;
         f.id = TrackId{static_cast<std::int64_t>(i)};
-        f.left = Observation{pixel + Vec2(320, middle_px), pixel / kFocal_px, kFocal_px / kPixel_sigma * Mat2::Identity()};
+        f.see(0, Observation{pixel + Vec2(320, middle_px), pixel / kFocal_px, kFocal_px / kPixel_sigma * Mat2::Identity()});
         frame.features.push_back(f);
       }
       out.push_back(std::move(frame));

@@ -91,7 +91,8 @@ struct FourCameras {
     out.stats.stereo += other.stats.stereo;
     for (TrackedFeature feature : other.features) {
       feature.id.value += 1'000'000;
-      feature.cameras = {2, 3};
+      feature.lead += 2;
+      for (Observation& o : feature.seen) o.camera += 2;
       out.features.push_back(feature);
     }
     return out;

@@ -124,13 +124,11 @@ class SimulatedFlight {
         else if (reobserves && known != known_.end() && !in_use.contains(known->second)) f.id = known->second;
         else f.id = TrackId{next_track_++};
         in_use.insert(f.id);
-        f.left = *left;
-        if (outlier) f.left = shifted(*f.left, outlier(k, f.id.value));
-        if (right_camera(k)) f.right = observe(rig.right(), in_camera(k, point(i), 1));
-        if (!left_camera(k)) f.left.reset();
-        if (!f.left && !f.right) continue;
+        if (left_camera(k)) f.see(0, outlier ? shifted(*left, outlier(k, f.id.value)) : *left);
+        if (right_camera(k)) f.see(1, observe(rig.right(), in_camera(k, point(i), 1)));
+        if (f.seen.empty()) continue;
         out.stats.tracked += followed;
-        out.stats.stereo += f.left && f.right;
+        out.stats.stereo += f.by_several();
         still[i] = f.id;
         out.features.push_back(f);
       }

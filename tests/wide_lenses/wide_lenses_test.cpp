@@ -55,11 +55,12 @@ Flown fly(const std::string& frontend, bool blind, const test::RenderedRecording
   system->on_tracked_frame([&](const TrackedFrame& frame) {
     EXPECT_LE(frame.cameras.size(), 2u);
     for (const TrackedFeature& f : frame.features) {
-      const int camera = f.cameras[!f.left];
+      const Observation& first = f.seen.front();
+      const int camera = first.camera;
       ASSERT_TRUE(camera == 0 || camera == 1);
       ++out.features_of[camera];
-      out.seen_by_both += f.left && f.right;
-      const auto ray = recording.rig.camera(camera).ray((f.left ? f.left : f.right)->pixel);
+      out.seen_by_both += f.by_several();
+      const auto ray = recording.rig.camera(camera).ray(first.pixel);
       ASSERT_TRUE(ray);
       out.behind += ray->z() < 0;
     }

@@ -25,9 +25,6 @@
 
 namespace fbvins {
 
-/// Cameras of a rig at most.
-inline constexpr int kMostCameras = 8;
-
 /// When a camera takes its images, s.
 struct CameraTimes {
   /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Observations of features for the estimator, with their weights. Pure functions.
 //
-//   feature.left = observe(rig.left(), px, 0.5);   // found to half a pixel; nothing where the lens has no ray
+//   feature.see(0, observe(rig.left(), px, 0.5));   // by camera 0, found to half a pixel; nothing where the lens has no ray
 #pragma once
 
 #include <optional>
@@ -31,9 +31,9 @@ std::vector<TrackedFeature> features_of(const Tracks& tracks, const Camera& left
     if (!track.observed) continue;
     TrackedFeature feature;
     feature.id = track.id;
-    feature.left = observe(left, track.px, track.normalised, sigma_px);
-    feature.right = track.right;
     feature.age_frames = track.age_frames;
+    feature.see(0, observe(left, track.px, track.normalised, sigma_px));
+    feature.see(1, track.right);
     features.push_back(feature);
   }
   return features;

@@ -7,6 +7,9 @@
 
 namespace fbvins {
 
+/// Cameras of a rig at most.
+inline constexpr int kMostCameras = 8;
+
 template <class T>
 const T& of_camera(const std::vector<T>& values, int camera) {
   if (const auto at = static_cast<std::size_t>(camera); at < values.size()) return values[at];

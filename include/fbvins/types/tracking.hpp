@@ -2,15 +2,19 @@
 // What the frontend gives the estimator, and the two values that are fed back.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "fbvins/core/fixed_list.hpp"
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/aiding.hpp"
 #include "fbvins/types/anchor.hpp"
+#include "fbvins/types/by_camera.hpp"
 #include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
@@ -33,6 +37,7 @@ struct Observation {
   /// d(pixel)/d(normalised) at this point, divided by the standard deviation of the pixel position:
   /// weighs a residual in normalised coordinates so that it counts in sigmas of the raw image.
   Mat2 sqrt_information = Mat2::Identity();
+  int camera = 0;  ///< of the rig, by number
   // Filled by the estimator, where not all is seen at the frame's stamp (docs/derivations/rolling_shutter.md):
   double rows = 0;              ///< of a rolling shutter, below the middle row, whose time is the camera's stamp
   double after_s = 0;           ///< when it was seen, after the frame's stamp
@@ -41,22 +46,41 @@ struct Observation {
   Vec3 displacement_B(const Vec3& v_B) const { return lever_B + after_s * v_B; }
 };
 
-/// The two cameras of a rig, by number, that a feature may be seen by: the left and the right one of its group.
-struct CameraPair {
-  std::int8_t left = 0, right = 1;
-  int operator[](bool of_right) const { return of_right ? right : left; }
-  bool has(int camera) const { return camera == left || camera == right; }
-};
-
-/// A feature in the newest frame, seen by at least one camera. Features keep their id, and their cameras, as long as they are
-/// followed.
+/// A feature in the newest frame, seen by at least one camera, by any cameras of the rig. It keeps its id, and its lead, as long
+/// as it is followed.
 struct TrackedFeature {
   TrackId id;
-  std::optional<Observation> left;   ///< absent while the left camera delivers no images
-  std::optional<Observation> right;  ///< present when matched, or followed, in the right image
-  int age_frames = 0;                ///< 0 when detected in this frame
-  CameraPair cameras = {};           ///< which ones left and right are
+  int age_frames = 0;  ///< 0 when detected in this frame
+  int lead = 0;        ///< the camera that it is followed in, and matched from in others; it may deliver no images
+  /// One of a camera at most, the lead's first.
+  FixedList<Observation, kMostCameras> seen = {};
+
+  /// By a camera; null where it does not see the feature.
+  const Observation* by(int camera) const {
+    const auto it = std::find_if(seen.begin(), seen.end(), [&](const Observation& o) { return o.camera == camera; });
+    return it == seen.end() ? nullptr : it;
+  }
+  Observation* by(int camera) { return const_cast<Observation*>(std::as_const(*this).by(camera)); }
+  const Observation* left() const { return by(0); }
+  const Observation* right() const { return by(1); }
+  bool by_several() const { return seen.size() >= 2; }
+
+  /// It is seen by this camera, instead of what was known of that.
+  void see(int camera, const Observation& observation);
+  /// Nothing where there is none.
+  void see(int camera, const std::optional<Observation>& observation) {
+    if (observation) see(camera, *observation);
+  }
+  void forget(int camera) {
+    seen.erase_if([&](const Observation& o) { return o.camera == camera; });
+  }
 };
+
+inline void TrackedFeature::see(int camera, const Observation& observation) {
+  forget(camera);
+  Observation& added = camera == lead ? seen.push_front(observation) : seen.push_back(observation);
+  added.camera = camera;
+}
 
 /// Matches of tracks by descriptor, and how many agree with the verified position of the track.
 struct DescriptorMatchCounts {
@@ -70,7 +94,7 @@ struct DescriptorMatchCounts {
 struct FrontendStats {
   int tracked = 0;        ///< features continued from the frame before
   int detected = 0;       ///< new features
-  int stereo = 0;         ///< features matched left-right
+  int stereo = 0;         ///< features seen by several cameras
   int lost_flow = 0;      ///< lost by the tracker or matcher
   int lost_check = 0;     ///< lost by the forward-backward, ratio or mutual check, or found on a moving thing
   int lost_epipolar = 0;  ///< lost by RANSAC on the epipolar constraint

@@ -16,11 +16,11 @@ namespace fbvins {
 namespace {
 
 /// Adds cameras like these of the rig, turned about the vertical of an upright rig, which is the left camera's -y, through a
-/// point 5 cm behind it.
-void add_turned(StereoRig& rig, double degrees, std::initializer_list<int> cameras) {
+/// point behind it.
+void add_turned(StereoRig& rig, double degrees, std::initializer_list<int> cameras, double behind_m = 0.05) {
   std::vector<MountedCamera> all;
   for (int i = 0; i < rig.camera_count(); ++i) all.push_back(rig.mounted(i));
-  const Vec3 axis = -(rig.T_BC0().q * Vec3::UnitY()), through = rig.T_BC0() * Vec3(0, 0, -0.05);
+  const Vec3 axis = -(rig.T_BC0().q * Vec3::UnitY()), through = rig.T_BC0() * Vec3(0, 0, -behind_m);
   const Quat turn(Eigen::AngleAxisd(degrees * kDegree, axis));
   const Pose<B, B> turned(turn, Vec3(through - turn * through));
   for (const int i : cameras) all.push_back({rig.camera(i), turned * rig.T_BC(i)});
@@ -99,6 +99,15 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
   }
   if (o.rig == "quad") add_turned(rig, 180, {0, 1});
   if (o.rig == "sides") add_turned(rig, 90, {0}), add_turned(rig, -90, {0});
+  if (o.rig == "trinocular") {
+    std::vector<MountedCamera> three = rig.cameras;
+    three.push_back({rig.left(), rig.T_BC0() * Pose<C0, C0>(Quat::Identity(), Vec3(0.05, -0.15, 0))});
+    rig = with_cameras(rig, three);
+  }
+  if (o.rig == "fan") {
+    rig = with_one_camera(rig);
+    for (const double degrees : {40, -40, 80}) add_turned(rig, degrees, {0}, 0.1);
+  }
   if (o.rig == "rgbd") {
     rig = with_depth(rig,
                      {.noise_at_1m_m = o.depth.noise_at_1m_m, .nearest_m = o.depth.nearest_m, .farthest_m = o.depth.farthest_m});

@@ -7,15 +7,11 @@ namespace fbvins {
 
 void FlightCollector::add(const TrackedFrame& frame) {
   std::vector<FlightView>& views = seen_[frame.id];
-  const auto see = [&](TrackId track, int camera, const std::optional<Observation>& seen) {
-    if (!seen) return;
-    tracks_.untriggered = tracks_.untriggered || frame.offsets.are_apart(0, camera);
-    views.push_back({track, camera, seen->pixel});
-  };
-  for (const TrackedFeature& feature : frame.features) {
-    see(feature.id, feature.cameras.left, feature.left);
-    see(feature.id, feature.cameras.right, feature.right);
-  }
+  for (const TrackedFeature& feature : frame.features)
+    for (const Observation& o : feature.seen) {
+      tracks_.untriggered = tracks_.untriggered || frame.offsets.are_apart(0, o.camera);
+      views.push_back({feature.id, o.camera, o.pixel});
+    }
 }
 
 void FlightCollector::add(const Keyframe& keyframe) {

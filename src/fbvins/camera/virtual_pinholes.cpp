@@ -175,10 +175,13 @@ StereoFrame VirtualPinholes::spread(StereoFrame frame) const {
 
 TrackedFrame VirtualPinholes::gathered(TrackedFrame frame) const {
   for (TrackedFeature& feature : frame.features) {
-    if (feature.left) feature.left->pixel += origin_px(feature.cameras.left);
-    if (feature.right) feature.right->pixel += origin_px(feature.cameras.right);
-    for (std::int8_t* camera : {&feature.cameras.left, &feature.cameras.right})
-      *camera = static_cast<std::int8_t>(lens_of(*camera));
+    feature.lead = lens_of(feature.lead);
+    const auto seen = std::exchange(feature.seen, {});
+    for (Observation o : seen) {
+      o.pixel += origin_px(o.camera);
+      if (feature.by(lens_of(o.camera)) == nullptr)
+        feature.see(lens_of(o.camera), o);  // where two faces of a lens meet, the first
+    }
   }
   frame.cameras.resize(std::min(frame.cameras.size(), lenses_.cameras.size()));
   return frame;

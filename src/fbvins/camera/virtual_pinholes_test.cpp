@@ -177,12 +177,13 @@ TEST(VirtualPinholes, OneLensIsSeveralCameras) {
   ASSERT_EQ(faces.rig().camera_count(), 4);
   TrackedFrame frame;
   frame.features.resize(2);
-  frame.features[1].cameras = {3, 3};
-  frame.features[1].left.emplace().pixel = Vec2(2, 3);
+  frame.features[1].lead = 3;
+  frame.features[1].see(3, Observation{.pixel = Vec2(2, 3)});
   frame.cameras = {true, true, true, true};
   const TrackedFrame gathered = faces.gathered(frame);
-  EXPECT_EQ(gathered.features[1].cameras.left, 0);
-  EXPECT_EQ(gathered.features[1].left->pixel, faces.origin_px(3) + Vec2(2, 3));
+  EXPECT_EQ(gathered.features[1].lead, 0);
+  ASSERT_TRUE(gathered.features[1].left());
+  EXPECT_EQ(gathered.features[1].left()->pixel, faces.origin_px(3) + Vec2(2, 3));
   EXPECT_EQ(gathered.cameras, std::vector<bool>{true});
 }
 

@@ -22,7 +22,7 @@ TrackedFrame tracked(const SeenFrame& seen, const Camera& camera) {
     if (!ray) continue;
     TrackedFeature f;
     f.id = TrackId{feature.id};
-    f.left = Observation{feature.px, *ray, camera.focal_px() / kTrack_px * Mat2::Identity()};
+    f.see(0, Observation{feature.px, *ray, camera.focal_px() / kTrack_px * Mat2::Identity()});
     out.features.push_back(std::move(f));
   }
   return out;

@@ -9,10 +9,17 @@
 namespace fbvins {
 namespace {
 
-CameraPair pair_of(int camera, const std::vector<LandmarkObservation>& observations) {
-  for (const LandmarkObservation& l : observations)
-    if (l.feature->cameras.left == camera || l.feature->cameras.right == camera) return l.feature->cameras;
-  return {static_cast<std::int8_t>(camera), static_cast<std::int8_t>(camera)};
+unsigned bit(int camera) { return 1U << static_cast<unsigned>(camera); }
+
+/// The cameras of the landmarks that a camera leads or sees.
+unsigned with_partners(int camera, const std::vector<LandmarkObservation>& observations) {
+  unsigned out = bit(camera);
+  for (const LandmarkObservation& l : observations) {
+    unsigned of_this = bit(l.feature->lead);
+    for (const Observation& o : l.feature->seen) of_this |= bit(o.camera);
+    if ((of_this & bit(camera)) != 0) out |= of_this;
+  }
+  return out;
 }
 
 }  // namespace
@@ -32,9 +39,7 @@ ResidualMedians camera_residuals(const std::vector<LandmarkObservation>& observa
   for (int c = 0; c < calibration.camera_count(); ++c) {
     std::vector<double> residuals, x, y;
     for (const LandmarkObservation& l : observations) {
-      const auto [left, right] = l.feature->cameras;
-      if (c != left && c != right) continue;
-      const std::optional<Observation>& o = c == left ? l.feature->left : l.feature->right;
+      const Observation* o = l.feature->by(c);
       if (!o) continue;
       const Vec3 p_C = cameras.R_CB[c] * (R_BG * (l.p_G - T_GB.p) - cameras.t_BC[c] - o->displacement_B(v_B));
       const Vec2 r =
@@ -49,22 +54,21 @@ ResidualMedians camera_residuals(const std::vector<LandmarkObservation>& observa
   return out;
 }
 
-std::optional<CameraPair> camera_off_alone(const std::vector<LandmarkObservation>& observations, const ResidualMedians& at,
-                                           const std::vector<double>& off, const std::function<double(double)>& limit) {
+std::uint8_t camera_off_alone(const std::vector<LandmarkObservation>& observations, const ResidualMedians& at,
+                              const std::vector<double>& off, const std::function<double(double)>& limit) {
   const auto worst = static_cast<int>(std::max_element(off.begin(), off.end()) - off.begin());
-  if (!at.of(worst)) return std::nullopt;
-  const auto alone = static_cast<std::int8_t>(worst);
-  for (const CameraPair cameras : {CameraPair{alone, alone}, pair_of(worst, observations)}) {
+  if (!at.of(worst)) return 0;
+  for (const unsigned cameras : {bit(worst), with_partners(worst, observations)}) {
     double of_others = 0;
     int others = 0;
     for (int c = 0; c < static_cast<int>(off.size()); ++c) {
-      if (cameras.has(c)) continue;
+      if ((cameras & bit(c)) != 0) continue;
       others += at.of(c);
       of_others = std::max(of_others, off[static_cast<std::size_t>(c)]);
     }
-    if (others > 0 && of_others < limit(off[static_cast<std::size_t>(worst)])) return cameras;
+    if (others > 0 && of_others < limit(off[static_cast<std::size_t>(worst)])) return static_cast<std::uint8_t>(cameras);
   }
-  return std::nullopt;
+  return 0;
 }
 
 }  // namespace fbvins

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -25,9 +26,10 @@ struct ResidualMedians {
 ResidualMedians camera_residuals(const std::vector<LandmarkObservation>& observations, const Calibration& calibration,
                                  const Pose<G, B>& T_GB, const Vec3& v_B);
 
-/// The camera (twice) that is off most, if the others are not, or else its pair, which sees the same things, if the others are
-/// not. `off`: by how much each camera is; `limit(off)`: below it the others are not, where the worst one is off by as much.
-std::optional<CameraPair> camera_off_alone(const std::vector<LandmarkObservation>& observations, const ResidualMedians& at,
-                                           const std::vector<double>& off, const std::function<double(double)>& limit);
+/// Cameras as in Health::without_cameras: the one that is off most, if the others are not, or else it and those that see the same
+/// things, if the others are not. None where that is not so. `off`: by how much each camera is; `limit(off)`: below it the others
+/// are not, where the worst one is off by as much.
+std::uint8_t camera_off_alone(const std::vector<LandmarkObservation>& observations, const ResidualMedians& at,
+                              const std::vector<double>& off, const std::function<double(double)>& limit);
 
 }  // namespace fbvins

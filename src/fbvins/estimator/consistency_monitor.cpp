@@ -2,6 +2,7 @@
 #include "fbvins/estimator/consistency_monitor.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -133,15 +134,15 @@ ConsistencyMonitor::Verdict ConsistencyMonitor::check(const std::vector<Landmark
   std::vector<double> off;
   for (std::size_t c = 0; c < static_cast<std::size_t>(calibration.camera_count()); ++c)
     off.push_back(excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0));
-  const std::optional<CameraPair> wrong = camera_off_alone(
+  const std::uint8_t wrong = camera_off_alone(
       observations, at_prediction, off, [&](double worst) { return excess < 0 ? kOther * worst : patience * kUsual_sigma; });
-  if (excess < 0 && wrong && wrong->left != wrong->right) {
+  if (excess < 0 && std::popcount(wrong) > 1) {
     pass(dt);  // something moves before one of several pairs
     return out;
   }
   const bool explained = seen.inliers >= kAgreeing * static_cast<double>(observations.size()) &&
                          (excess < 0 || at_seen.worst() < kBetter * at_prediction.worst());
-  if (!explained && !wrong) {
+  if (!explained && wrong == 0) {
     take_unexplained(dt);
     return out;
   }
@@ -150,7 +151,7 @@ ConsistencyMonitor::Verdict ConsistencyMonitor::check(const std::vector<Landmark
     pass(dt);
     return out;
   }
-  if (wrong) {
+  if (wrong != 0) {
     if (exclude(excess < 0, dt)) out.wrong = wrong;
     pass(dt);  // the readings agree with the others
     return out;

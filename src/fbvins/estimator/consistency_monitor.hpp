@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -24,10 +25,10 @@ namespace fbvins {
 class ConsistencyMonitor {
  public:
   struct Verdict {
-    bool imu_contradicts = false;     ///< images agree with one another, but not with the readings
-    std::optional<CameraPair> wrong;  ///< this camera (twice), or this pair, alone contradicts the readings
-    std::optional<Pose<G, B>> seen;   ///< by the images alone, where the readings are contradicted
-    ImuNoiseScale noise;              ///< with which the readings count
+    bool imu_contradicts = false;    ///< images agree with one another, but not with the readings
+    std::uint8_t wrong = 0;          ///< these cameras, bits as in Health::without_cameras, alone contradict the readings
+    std::optional<Pose<G, B>> seen;  ///< by the images alone, where the readings are contradicted
+    ImuNoiseScale noise;             ///< with which the readings count
   };
 
   /// `calibrating`: mounting or time offset are still being found, which contradict the readings, too.

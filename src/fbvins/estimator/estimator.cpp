@@ -59,7 +59,7 @@ Vec3 Estimator::gravity_G() const { return window_.tilt().gravity_G(options_.gra
 
 Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
-  const TrackedFrame& whole = contract_.enforced(tracked);
+  const TrackedFrame& whole = contract_.enforced(tracked, calibration_.camera_count());
   if (time_alignment_.add(whole, running_) && !running_) initialiser_.reset();
   if (!options_.estimate_line_delay) exposures_.correct_line_delay(time_alignment_.line_delay_correction_s());
   const bool as_it_is = exposures_.at_stamp(whole) && !options_.estimate_line_delay;
@@ -173,9 +173,9 @@ std::vector<TrackedFeature> Estimator::check_readings(const TrackedFrame& frame,
     predicted = predict(frame, imu);
   }
   if (verdict.imu_contradicts) predicted.state.T_FB = *verdict.seen;
-  if (!verdict.wrong) return frame.features;
-  wrong_cameras_ = static_cast<std::uint8_t>(1u << verdict.wrong->left | 1u << verdict.wrong->right);
-  return without_cameras(frame.features, *verdict.wrong);
+  if (verdict.wrong == 0) return frame.features;
+  wrong_cameras_ = verdict.wrong;
+  return without_cameras(frame.features, verdict.wrong);
 }
 
 const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {

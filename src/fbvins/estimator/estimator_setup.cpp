@@ -54,12 +54,10 @@ Frame without_state(const TrackedFrame& tracked) {
   return f;
 }
 
-std::vector<TrackedFeature> without_cameras(std::vector<TrackedFeature> features, const CameraPair& cameras) {
-  for (TrackedFeature& feature : features) {
-    if (cameras.has(feature.cameras.left)) feature.left.reset();
-    if (cameras.has(feature.cameras.right)) feature.right.reset();
-  }
-  std::erase_if(features, [](const TrackedFeature& f) { return !f.left && !f.right; });
+std::vector<TrackedFeature> without_cameras(std::vector<TrackedFeature> features, std::uint8_t cameras) {
+  for (TrackedFeature& feature : features)
+    feature.seen.erase_if([&](const Observation& o) { return (cameras >> o.camera & 1U) != 0; });
+  std::erase_if(features, [](const TrackedFeature& f) { return f.seen.empty(); });
   return features;
 }
 

@@ -27,7 +27,7 @@ double scale_sigma_of(const StereoRig& rig);
 /// A frame of the window, whose state and readings are still to come.
 Frame without_state(const TrackedFrame& tracked);
 /// What the other cameras see.
-std::vector<TrackedFeature> without_cameras(std::vector<TrackedFeature> features, const CameraPair& cameras);
+std::vector<TrackedFeature> without_cameras(std::vector<TrackedFeature> features, std::uint8_t cameras);
 /// The start's frame of that number, with its state and its readings.
 Frame frame_of_start(const InitialSolution& start, std::size_t number, const ImuNoise& noise);
 

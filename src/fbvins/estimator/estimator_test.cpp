@@ -119,7 +119,7 @@ TEST(Estimator, AFailedSolveKeepsTheLastCovarianceAndEnlargesIt) {
   Odometry before, failed;
   for (int k = 0; k <= 80; ++k) {
     TrackedFrame frame = flight.frame(k);
-    if (k == 80) frame.features[0].left->normalised.x() = 1e300;  // its square is infinite
+    if (k == 80) frame.features[0].by(0)->normalised.x() = 1e300;  // its square is infinite
     before = std::exchange(failed, estimator.process(frame).odometry);
   }
   ASSERT_EQ(before.health.state, HealthState::good);

@@ -10,22 +10,20 @@ Exposures::Exposures(const StereoRig& rig) : rolling_(has_rolling_shutter(rig)),
 }
 
 void Exposures::refer_to_stamp(const ExposureMotion& motion, const Calibration& calibration, TrackedFrame& frame) const {
-  const auto refer = [&](Observation& o, int camera) {
-    const int clock = depth_ ? 0 : camera;
+  const auto refer = [&](Observation& o) {
+    const int clock = depth_ ? 0 : o.camera;
     const Shutter& shutter = shutters_[static_cast<std::size_t>(clock)];
     o.rows = o.pixel.y() - shutter.middle_row_px;
     o.after_s = frame.offsets.of(clock).seconds() + o.rows * (shutter.line_delay_s + line_delay_correction_s_);  // (S1)
     if (o.after_s == 0) return;
-    const Pose<B, C0> T_BC = calibration.T_BC(camera);
+    const Pose<B, C0> T_BC = calibration.T_BC(o.camera);
     const Quat turn = motion.turn(o.after_s);
     const Vec3 ray_C = T_BC.q.conjugate() * (turn * (T_BC.q * o.normalised.homogeneous()));  // (S3)
     if (ray_C.z() > 1e-3) o.normalised = ray_C.hnormalized();
     o.lever_B = turn * T_BC.p - T_BC.p + motion.moved(o.after_s);  // (S4)
   };
-  for (TrackedFeature& f : frame.features) {
-    if (f.left) refer(*f.left, f.cameras.left);
-    if (f.right) refer(*f.right, f.cameras.right);
-  }
+  for (TrackedFeature& f : frame.features)
+    for (Observation& o : f.seen) refer(o);
 }
 
 }  // namespace fbvins

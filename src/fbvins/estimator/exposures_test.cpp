@@ -67,8 +67,8 @@ TrackedFrame frame_of(const StereoRig& rig, const Motion& m, const Vec3& p_B, do
   TrackedFrame frame;
   frame.offsets = offsets;
   frame.features.resize(1);
-  frame.features[0].left = observed(0, left_row);
-  frame.features[0].right = observed(1, right_row);
+  frame.features[0].see(0, observed(0, left_row));
+  frame.features[0].see(1, observed(1, right_row));
   return frame;
 }
 
@@ -86,10 +86,11 @@ TEST_P(ReferredToStamp, ObservationsOfAMovingBodyAreThoseOfDisplacedCameras) {
   const Motion m;
   const Vec3 p_B = rig.T_BC0() * Vec3(0.4, -0.5, 2);
   TrackedFrame frame = frame_of(rig, m, p_B, c.left_row, c.right_row, c.offsets);
-  EXPECT_GT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B) + error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 4e-3);
+  EXPECT_GT(error(*frame.features[0].left(), rig.T_BC(0), m.v, p_B) + error(*frame.features[0].right(), rig.T_BC(1), m.v, p_B),
+            4e-3);
   Exposures(rig).refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
-  EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), c.left);
-  EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), c.right);
+  EXPECT_LT(error(*frame.features[0].left(), rig.T_BC(0), m.v, p_B), c.left);
+  EXPECT_LT(error(*frame.features[0].right(), rig.T_BC(1), m.v, p_B), c.right);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ReferredToStamp,
@@ -110,8 +111,8 @@ TEST(Exposures, ADepthIsSeenWithItsPixel) {
   const Vec3 p_B = rig.T_BC0() * Vec3(0.8, -0.9, 3);
   TrackedFrame frame = frame_of(rig, m, p_B, 460, 460, {});
   Exposures(sensor).refer_to_stamp(ExposureMotion(m.readings({}), {}, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
-  EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), 1e-4);
-  EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 3e-4);  // ten metres to the right
+  EXPECT_LT(error(*frame.features[0].left(), rig.T_BC(0), m.v, p_B), 1e-4);
+  EXPECT_LT(error(*frame.features[0].right(), rig.T_BC(1), m.v, p_B), 3e-4);  // ten metres to the right
 }
 
 TEST(Exposures, BeforeTheStartTheTurnAloneIsKnown) {
@@ -120,19 +121,19 @@ TEST(Exposures, BeforeTheStartTheTurnAloneIsKnown) {
   const Vec3 p_B = rig.T_BC0() * Vec3(0.4, -0.5, 2);
   TrackedFrame frame = frame_of(rig, m, p_B, 20, 470, {});
   Exposures(rig).refer_to_stamp(ExposureMotion(m.readings({}), {}), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
-  EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), Vec3::Zero(), p_B), 1e-4);
-  EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), Vec3::Zero(), p_B), 1e-4);
+  EXPECT_LT(error(*frame.features[0].left(), rig.T_BC(0), Vec3::Zero(), p_B), 1e-4);
+  EXPECT_LT(error(*frame.features[0].right(), rig.T_BC(1), Vec3::Zero(), p_B), 1e-4);
 }
 
 TEST(Exposures, WhatIsSeenAtTheStampKeepsEveryBit) {
   const StereoRig rig = cameras(0);
   TrackedFrame frame = frame_of(rig, Motion{}, rig.T_BC0() * Vec3(0.8, -0.9, 3), 20, 40, {});
-  const Vec2 before = frame.features[0].left->normalised;
+  const Vec2 before = frame.features[0].left()->normalised;
   const Exposures exposures(rig);
   EXPECT_TRUE(exposures.at_stamp(frame));
   exposures.refer_to_stamp(ExposureMotion(Motion{}.readings({}), {}, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
-  EXPECT_EQ(frame.features[0].left->normalised, before);
-  EXPECT_EQ(frame.features[0].left->displacement_B(Vec3(1, 2, 3)), Vec3::Zero());
+  EXPECT_EQ(frame.features[0].left()->normalised, before);
+  EXPECT_EQ(frame.features[0].left()->displacement_B(Vec3(1, 2, 3)), Vec3::Zero());
   frame.offsets.set(1, Duration{1});
   EXPECT_FALSE(exposures.at_stamp(frame));
 }
@@ -145,13 +146,13 @@ TEST(Exposures, EachCameraHasItsOwnRows) {
     const Motion m;
     const Vec3 p_B = rig.T_BC0() * Vec3(0.4, -0.5, 2);
     TrackedFrame frame = frame_of(rig, m, p_B, 20, 40, {});
-    const Vec2 before = (right_rolls ? frame.features[0].left : frame.features[0].right)->normalised;
+    const Vec2 before = frame.features[0].by(right_rolls ? 0 : 1)->normalised;
     const Exposures exposures(rig);
     EXPECT_FALSE(exposures.at_stamp(frame));
     exposures.refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {{rig.T_BC(0), rig.T_BC(1)}}, frame);
-    EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), 1e-4);
-    EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 1e-4);
-    EXPECT_EQ((right_rolls ? frame.features[0].left : frame.features[0].right)->normalised, before);
+    EXPECT_LT(error(*frame.features[0].left(), rig.T_BC(0), m.v, p_B), 1e-4);
+    EXPECT_LT(error(*frame.features[0].right(), rig.T_BC(1), m.v, p_B), 1e-4);
+    EXPECT_EQ(frame.features[0].by(right_rolls ? 0 : 1)->normalised, before);
   }
 }
 

@@ -21,7 +21,7 @@ constexpr double kFarthest = 4;
 /// What the tilt, an uneven floor and landmarks that are seen again in the next keyframe leave.
 constexpr double kScaleSigma = 0.03;
 /// Landmarks of fewer frames have no depth to rely on.
-constexpr std::size_t kFewestObservations = 4;
+constexpr int kFewestFrames = 4;
 /// Lower, the floor's unevenness is too large a share of the height.
 constexpr double kLeastDrop_m = 1;
 /// Nearer to one another keyframes show no scale.
@@ -80,7 +80,7 @@ std::shared_ptr<const Factor> distance_by_floor(const NewFrame& f, double drop_m
   if (distance_m < kLeastBaseline_m) return nullptr;
   std::vector<Vec3> landmarks_G;
   for (const LocatedLandmark& l : located_landmarks(f.window, f.calibration))
-    if (f.window.landmarks().find(l.track)->observations.size() >= kFewestObservations) landmarks_G.push_back(l.p_G);
+    if (f.window.landmarks().find(l.track)->frame_count() >= kFewestFrames) landmarks_G.push_back(l.p_G);
   const auto scale = floor_scale(landmarks_G, f.frame.state.T_FB.p, f.window.tilt().gravity_G(-1), drop_m);
   if (!scale) return nullptr;
   return std::make_shared<const DistanceFactor>(oldest->id, newest->id, distance_m / scale->ratio, scale->sigma * distance_m);

@@ -7,14 +7,17 @@
 namespace fbvins {
 namespace {
 
-bool is_finite(const std::optional<Observation>& o) {
-  return !o || (o->pixel.allFinite() && o->normalised.allFinite() && o->sqrt_information.allFinite());
+bool is_finite(const Observation& o) { return o.pixel.allFinite() && o.normalised.allFinite() && o.sqrt_information.allFinite(); }
+
+bool is_possible(const TrackedFeature& f, int cameras) {
+  const auto is_of_rig = [cameras](int camera) { return camera >= 0 && camera < cameras; };
+  return !f.seen.empty() && is_of_rig(f.lead) && std::ranges::all_of(f.seen, [&](const Observation& o) {
+    return is_of_rig(o.camera) && f.by(o.camera) == &o && is_finite(o);
+  });
 }
 
-bool is_possible(const TrackedFeature& f) { return (f.left || f.right) && is_finite(f.left) && is_finite(f.right); }
-
 int stereo_matches(const std::vector<TrackedFeature>& features) {
-  return static_cast<int>(std::ranges::count_if(features, [](const TrackedFeature& f) { return f.left && f.right; }));
+  return static_cast<int>(std::ranges::count_if(features, &TrackedFeature::by_several));
 }
 
 }  // namespace
@@ -26,15 +29,16 @@ bool FrameContract::any_twice(const std::vector<TrackedFeature>& features) {
   return std::ranges::adjacent_find(ids_) != ids_.end();
 }
 
-const TrackedFrame& FrameContract::enforced(const TrackedFrame& frame) {
+const TrackedFrame& FrameContract::enforced(const TrackedFrame& frame, int cameras) {
   const std::vector<TrackedFeature>& features = frame.features;
-  const bool good = std::ranges::all_of(features, is_possible) && !any_twice(features);
+  const auto is_possible_here = [cameras](const TrackedFeature& f) { return is_possible(f, cameras); };
+  const bool good = std::ranges::all_of(features, is_possible_here) && !any_twice(features);
   const bool counted = frame.stats.stereo > 0 || stereo_matches(features) == 0;
   broken_ = 0;
   if (good && counted) return frame;
   accepted_ = frame;
   std::unordered_set<TrackId> seen;
-  std::erase_if(accepted_.features, [&](const TrackedFeature& f) { return !is_possible(f) || !seen.insert(f.id).second; });
+  std::erase_if(accepted_.features, [&](const TrackedFeature& f) { return !is_possible_here(f) || !seen.insert(f.id).second; });
   accepted_.stats.stereo = stereo_matches(accepted_.features);
   broken_ = static_cast<int>(features.size() - accepted_.features.size());
   return accepted_;

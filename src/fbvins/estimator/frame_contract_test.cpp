@@ -18,8 +18,7 @@ using test::SimulatedFlight;
 TrackedFeature seen(int track) {
   TrackedFeature f;
   f.id = TrackId{track};
-  f.left.emplace().pixel = Vec2(track, 1);
-  f.right = f.left;
+  for (const int camera : {0, 1}) f.see(camera, Observation{.pixel = Vec2(track, 1)});
   return f;
 }
 
@@ -28,16 +27,16 @@ TEST(FrameContract, AFrameThatHoldsToItIsNotCopied) {
   frame.features = {seen(3), seen(1)};
   frame.stats.stereo = 2;
   FrameContract contract;
-  EXPECT_EQ(&contract.enforced(frame), &frame);
+  EXPECT_EQ(&contract.enforced(frame, 2), &frame);
   EXPECT_EQ(contract.broken(), 0);
 }
 
 TEST(FrameContract, StereoMatchesThatWereNotCountedAreCounted) {
   TrackedFrame frame;
   frame.features = {seen(3), seen(1)};
-  frame.features[0].right.reset();
+  frame.features[0].forget(1);
   FrameContract contract;
-  EXPECT_EQ(contract.enforced(frame).stats.stereo, 1);
+  EXPECT_EQ(contract.enforced(frame, 2).stats.stereo, 1);
   EXPECT_EQ(contract.broken(), 0);
 }
 
@@ -45,22 +44,25 @@ TEST(FrameContract, WhatCannotBeIsLeftOut) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::function<void(TrackedFeature&)> breaks[] = {
       [](TrackedFeature& f) { f.id = TrackId{1}; },
-      [&](TrackedFeature& f) { f.left->pixel.x() = nan; },
-      [&](TrackedFeature& f) { f.right->normalised.y() = nan; },
-      [&](TrackedFeature& f) { f.left->sqrt_information(0, 1) = 1 / 0.0; },
-      [](TrackedFeature& f) { f.left.reset(), f.right.reset(); },
+      [&](TrackedFeature& f) { f.by(0)->pixel.x() = nan; },
+      [&](TrackedFeature& f) { f.by(1)->normalised.y() = nan; },
+      [&](TrackedFeature& f) { f.by(0)->sqrt_information(0, 1) = 1 / 0.0; },
+      [](TrackedFeature& f) { f.seen.clear(); },
+      [](TrackedFeature& f) { f.see(2, Observation{}); },
+      [](TrackedFeature& f) { f.by(1)->camera = 0; },
+      [](TrackedFeature& f) { f.lead = -1; },
   };
   for (const auto& break_it : breaks) {
     TrackedFrame frame;
     frame.features = {seen(1), seen(2), seen(3)};
     break_it(frame.features[1]);
     FrameContract contract;
-    const TrackedFrame& accepted = contract.enforced(frame);
+    const TrackedFrame& accepted = contract.enforced(frame, 2);
     ASSERT_EQ(accepted.features.size(), 2u);
     EXPECT_EQ(accepted.features[0].id, TrackId{1});
     EXPECT_EQ(accepted.features[1].id, TrackId{3});
     EXPECT_EQ(contract.broken(), 1);
-    EXPECT_EQ(contract.enforced(TrackedFrame{}).features.size(), 0u);
+    EXPECT_EQ(contract.enforced(TrackedFrame{}, 2).features.size(), 0u);
     EXPECT_EQ(contract.broken(), 0);
   }
 }
@@ -74,7 +76,7 @@ TEST(FrameContract, AFlightGoesOnAndSaysSo) {
     if (k >= 60 && k < 80) {
       const std::vector<TrackedFeature> again = frame.features;
       frame.features.insert(frame.features.end(), again.begin(), again.end());
-      frame.features[1].left->normalised.x() = std::numeric_limits<double>::quiet_NaN();
+      frame.features[1].seen.front().normalised.x() = std::numeric_limits<double>::quiet_NaN();
     }
     last = estimator.process(frame).odometry;
     const Health expected{HealthState::degraded, HealthReason::frontend_fault};

@@ -56,7 +56,8 @@ void leave_out_moving(std::vector<TrackedFrame>& frames) {
   std::unordered_set<TrackId> moving;
   for (const TrackedFrame& frame : frames)
     for (const TrackedFeature& f : frame.features)
-      if (f.left && (f.left->pixel - first.try_emplace(f.id, f.left->pixel).first->second).norm() > kStill_px)
+      if (const Observation* o = f.by(f.lead);
+          o && (o->pixel - first.try_emplace(f.id, o->pixel).first->second).norm() > kStill_px)
         moving.insert(f.id);
   for (TrackedFrame& frame : frames)
     std::erase_if(frame.features, [&](const TrackedFeature& f) { return moving.contains(f.id); });
@@ -116,9 +117,9 @@ bool Initialiser::by_one_camera(const TrackedFrame& frame) const { return one_ca
 
 /// By which the motion can be found.
 int Initialiser::usable_features(const TrackedFrame& frame, bool at_rest) const {
-  const bool left_alone = at_rest ? one_camera_ : by_one_camera(frame);
-  return static_cast<int>(
-      std::ranges::count_if(frame.features, [&](const TrackedFeature& f) { return f.left && (left_alone || f.right); }));
+  const bool lead_alone = at_rest ? one_camera_ : by_one_camera(frame);
+  return static_cast<int>(std::ranges::count_if(
+      frame.features, [&](const TrackedFeature& f) { return f.by(f.lead) && (lead_alone || f.by_several()); }));
 }
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,

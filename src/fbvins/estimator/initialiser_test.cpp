@@ -136,7 +136,7 @@ TEST(Initialiser, WaitsForFeaturesInBothCameras) {
 
 /// The frame with at most `most` features, all matched in stereo.
 TrackedFrame with_features(TrackedFrame frame, std::size_t most) {
-  std::erase_if(frame.features, [](const TrackedFeature& f) { return !f.right; });
+  std::erase_if(frame.features, [](const TrackedFeature& f) { return !f.by_several(); });
   frame.features.resize(std::min(most, frame.features.size()));
   return frame;
 }

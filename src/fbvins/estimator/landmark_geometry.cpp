@@ -35,7 +35,7 @@ Vec3 scaled_point(const Landmark& landmark, const Frame& target, int camera, con
   PairGeometry pair;
   pair.set(frames.at(landmark.host).state.T_FB, target.state.T_FB);
   const RayInCamera line =
-      ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.ray_camera(), Vec3::Zero(), pair, cameras, camera, Vec3::Zero());
+      ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.ray_camera, Vec3::Zero(), pair, cameras, camera, Vec3::Zero());
   return line.a + landmark.alpha_beta_rho.z() * line.b;
 }
 
@@ -45,24 +45,22 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   // Linear in rho: (a + rho b) is parallel to (z, 1) for every observation (W4).
   const CameraGeometry cameras(calibration);
   const NavState<G>& host = frames.at(landmark.host).state;
-  const StereoObservation& first = landmark.observations.front();
-  const bool from_right = !first.left;
-  const Observation& of_host = from_right ? *first.right : *first.left;
+  const Observation& of_host = landmark.observations.front().seen;
   const Vec2 ray = of_host.normalised;
-  const int from = landmark.cameras[from_right];
+  const int from = of_host.camera;
   const Vec3 displaced_from_B = of_host.displacement_B(host.v_B());
   double numerator = 0, information = 0;
   const auto each = [&](auto&& visit) {
-    for (const StereoObservation& s : landmark.observations) {
-      PairGeometry pair;
-      const NavState<G>& target = frames.at(s.frame).state;
-      pair.set(host.T_FB, target.T_FB);
-      const auto seen_by = [&](int camera, const Observation& o) {
-        visit(ray_in_camera(ray, from, displaced_from_B, pair, cameras, camera, o.displacement_B(target.v_B())), o);
-      };
-      const bool in_host = s.frame == landmark.host;
-      if (s.left && !in_host) seen_by(landmark.cameras.left, *s.left);
-      if (s.right && !(in_host && from_right)) seen_by(landmark.cameras.right, *s.right);
+    PairGeometry pair;
+    const NavState<G>* target = nullptr;
+    for (std::size_t i = 0; i < landmark.observations.size(); ++i) {
+      const auto& [frame, o, velocity] = landmark.observations[i];
+      if (i == 0 || frame != landmark.observations[i - 1].frame) {
+        target = &frames.at(frame).state;
+        pair.set(host.T_FB, target->T_FB);
+      }
+      if (frame == landmark.host && o.camera == from) continue;
+      visit(ray_in_camera(ray, from, displaced_from_B, pair, cameras, o.camera, o.displacement_B(target->v_B())), o);
     }
   };
   each([&](const RayInCamera& line, const Observation& o) {
@@ -86,38 +84,48 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   const Vec3 p_C = ray.homogeneous() + rho * (cameras.R_CB[from] * displaced_from_B);  // from the camera's place at the stamp
   if (p_C.z() < kMinScaledDepth) return false;
   landmark.alpha_beta_rho = Vec3(p_C.x(), p_C.y(), rho) / p_C.z();
-  landmark.right_ray = from_right;
+  landmark.ray_camera = from;
   return true;
 }
 
 Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const FrameList& frames,
                             const Calibration& calibration) {
-  return scaled_point(landmark, target, landmark.cameras.left, frames, calibration);
+  return scaled_point(landmark, target, landmark.lead, frames, calibration);
 }
 
 void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const Calibration& calibration) {
-  const StereoObservation* observation = landmark.observation_in(new_host);
-  const bool right_ray = observation != nullptr && !observation->left;
+  const std::span<const Sighting> there = landmark.seen_by_cameras(new_host);
+  const int camera = there.empty() ? landmark.lead : there.front().seen.camera;
   if (landmark.triangulated) {
-    const Vec3 p = scaled_point(landmark, frames.at(new_host), landmark.cameras[right_ray], frames, calibration);
+    const Vec3 p = scaled_point(landmark, frames.at(new_host), camera, frames, calibration);
     if (p.z() < kMinScaledDepth) landmark.triangulated = false;
     else landmark.alpha_beta_rho = Vec3(p.x(), p.y(), landmark.alpha_beta_rho.z()) / p.z();
   }
   landmark.host = new_host;
-  landmark.right_ray = right_ray;
+  landmark.ray_camera = camera;
 }
 
-void set_velocities(StereoObservation& before, StereoObservation& now, double gap_s) {
+void set_velocities(std::span<Sighting> before, std::span<Sighting> now, double gap_s) {
   if (gap_s <= 0 || gap_s > kLongestGap_s) return;
-  const bool left = now.left && before.left, right = now.right && before.right;
-  if (!left && !right) return;
-  if (left) now.left_velocity = (now.left->normalised - before.left->normalised) / gap_s;
-  now.right_velocity = right ? Vec2((now.right->normalised - before.right->normalised) / gap_s) : now.left_velocity;
-  if (!left) now.left_velocity = now.right_velocity;
-  // The observation before has differences on both sides now: their mean is its velocity to second order.
-  const double share = before.left_velocity.isZero(0) ? 1.0 : 0.5;
-  before.left_velocity += share * (now.left_velocity - before.left_velocity);
-  before.right_velocity += share * (now.right_velocity - before.right_velocity);
+  const auto by = [](std::span<Sighting> in, int camera) -> const Sighting* {
+    const auto it = std::find_if(in.begin(), in.end(), [&](const Sighting& s) { return s.seen.camera == camera; });
+    return it == in.end() ? nullptr : &*it;
+  };
+  std::optional<Vec2> first;  // of a camera that saw it both times: that of the others
+  const auto difference = [&](const Sighting& s) -> std::optional<Vec2> {
+    const Sighting* b = by(before, s.seen.camera);
+    return b ? std::optional<Vec2>((s.seen.normalised - b->seen.normalised) / gap_s) : first;
+  };
+  for (const Sighting& s : now)
+    if (first = difference(s); first) break;
+  if (!first) return;
+  for (Sighting& s : now) s.velocity = *difference(s);
+  // The observations before have differences on both sides now: their mean is the velocity to second order.
+  const double share = before.front().velocity.isZero(0) ? 1.0 : 0.5;
+  for (Sighting& s : before) {
+    const Sighting* n = by(now, s.seen.camera);
+    s.velocity += share * ((n ? n->velocity : *first) - s.velocity);
+  }
 }
 
 }  // namespace fbvins

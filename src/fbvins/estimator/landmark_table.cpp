@@ -11,10 +11,16 @@ constexpr std::size_t kMaxOutlierCounts = 20000;
 
 }  // namespace
 
-const StereoObservation* Landmark::observation_in(FrameId frame) const {
-  const auto it =
-      std::find_if(observations.begin(), observations.end(), [&](const StereoObservation& s) { return s.frame == frame; });
-  return it == observations.end() ? nullptr : &*it;
+std::span<const Sighting> Landmark::seen_by_cameras(FrameId frame) const {
+  const auto is_of_it = [&](const Sighting& s) { return s.frame == frame; };
+  const auto first = std::find_if(observations.begin(), observations.end(), is_of_it);
+  return {first, std::find_if_not(first, observations.end(), is_of_it)};
+}
+
+int Landmark::frame_count() const {
+  int frames = 0;
+  for (std::size_t i = 0; i < observations.size(); ++i) frames += i == 0 || observations[i].frame != observations[i - 1].frame;
+  return frames;
 }
 
 void LandmarkTable::clear() {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -16,30 +17,34 @@
 
 namespace fbvins {
 
-/// The observations of a landmark by the two cameras of its group in one frame, one at least.
-struct StereoObservation {
+/// A landmark seen by one camera in one frame.
+struct Sighting {
   FrameId frame;
-  std::optional<Observation> left, right;
-  Vec2 left_velocity = Vec2::Zero();  ///< of the normalised position, 1/s
-  Vec2 right_velocity = Vec2::Zero();
+  Observation seen;
+  Vec2 velocity = Vec2::Zero();  ///< of the normalised position, 1/s
 };
 
 /// A track and, once triangulated, its 3-D point.
 struct Landmark {
   LandmarkId id;
   TrackId track;
-  CameraPair cameras;
+  int lead = 0;  ///< the camera that the track is followed in
   FrameId host;
-  bool right_ray = false;  ///< on a ray of the host's right camera: the left one did not see it
+  int ray_camera = 0;  ///< of the host, on whose ray it is: the lead, or another one where the lead did not see it
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
-  std::optional<LandmarkPrior> prior;           ///< of a re-observed one
-  int outlier_count = 0;                        ///< solves after which observations of it were removed as outliers
-  std::vector<StereoObservation> observations;  ///< oldest first; a landmark without any is removed
+  std::optional<LandmarkPrior> prior;  ///< of a re-observed one
+  int outlier_count = 0;               ///< solves after which observations of it were removed as outliers
+  /// The oldest frame's first, in each frame the lead's; a landmark without any is removed.
+  std::vector<Sighting> observations;
 
-  int ray_camera() const { return cameras[right_ray]; }
-  bool seen_in(FrameId frame) const { return observation_in(frame) != nullptr; }
-  const StereoObservation* observation_in(FrameId frame) const;
+  bool seen_in(FrameId frame) const { return !seen_by_cameras(frame).empty(); }
+  std::span<const Sighting> seen_by_cameras(FrameId frame) const;
+  /// In the newest frame that saw it.
+  std::span<const Sighting> newest() const { return seen_by_cameras(observations.back().frame); }
+  bool by_several_frames() const { return !observations.empty() && observations.front().frame != observations.back().frame; }
+  /// How many frames saw it.
+  int frame_count() const;
 };
 
 class LandmarkTable {

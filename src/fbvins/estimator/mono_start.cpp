@@ -48,12 +48,13 @@ std::vector<Track> tracks_of(std::span<const TrackedFrame> frames, const Mat3& R
   std::vector<Track> tracks;
   for (std::size_t k = 0; k < frames.size(); ++k)
     for (const TrackedFeature& f : frames[k].features) {
-      if (!f.left || f.cameras.left != 0) continue;  // by camera 0 alone
+      const Observation* o = f.lead == 0 ? f.by(0) : nullptr;  // by camera 0 alone
+      if (!o) continue;
       const auto [at, is_new] = index.try_emplace(f.id, tracks.size());
       if (is_new) tracks.emplace_back();
-      const Vec3 ray(f.left->normalised.x(), f.left->normalised.y(), 1);
+      const Vec3 ray(o->normalised.x(), o->normalised.y(), 1);
       // A length of the normalised plane is shorter as an angle, far from the axis.
-      const double sigma = 1 / (std::sqrt(std::abs(f.left->sqrt_information.determinant())) * ray.norm());
+      const double sigma = 1 / (std::sqrt(std::abs(o->sqrt_information.determinant())) * ray.norm());
       tracks[at->second].push_back({k, R_BC * ray.normalized(), sigma});
     }
   std::erase_if(tracks, [](const Track& t) { return t.size() < kFewestObservations; });

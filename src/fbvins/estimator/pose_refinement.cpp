@@ -47,13 +47,12 @@ PoseRefinement refine_pose(const std::vector<LandmarkObservation>& observations,
     const Mat3 R_BG = out.T_GB.R().transpose();
     for (const LandmarkObservation& l : observations) {
       const Vec3 p_B = R_BG * (l.p_G - out.T_GB.p);
-      const auto add = [&](const Observation& o, int camera) {
-        n.add(o, p_B, cameras.R_CB[camera], cameras.t_BC[camera] + o.displacement_B(v_B), R_BG);
-      };
-      if (l.feature->left) add(*l.feature->left, l.feature->cameras.left);
-      const int of_left = n.inliers;
-      if (l.feature->right) add(*l.feature->right, l.feature->cameras.right);
-      n.inliers = l.feature->left ? of_left : n.inliers;
+      int with_first = n.inliers;
+      for (const Observation& o : l.feature->seen) {
+        n.add(o, p_B, cameras.R_CB[o.camera], cameras.t_BC[o.camera] + o.displacement_B(v_B), R_BG);
+        if (&o == l.feature->seen.begin()) with_first = n.inliers;
+      }
+      n.inliers = with_first;
     }
     out.inliers = n.inliers;
     const Eigen::LDLT<Mat6> ldlt(n.H);

@@ -17,7 +17,7 @@ struct LandmarkObservation {  // a landmark of known position and its observatio
 
 struct PoseRefinement {
   Pose<G, B> T_GB;
-  int inliers = 0;         ///< points whose left observation, or right one where there is no left one, is within 3 sigma
+  int inliers = 0;         ///< points whose first observation is within 3 sigma
   bool converged = false;  ///< or stopped at max_iterations with inliers
 };
 

@@ -29,7 +29,7 @@ struct Seen {
     for (const Vec3& p_G : flight.points()) {
       const Vec3 p_C = calibration.T_BC0().inverse() * (truth.inverse() * p_G);
       if (p_C.z() < 0.2) continue;
-      const double distance = (p_C.head<2>() / p_C.z() - f.left->normalised).norm();
+      const double distance = (p_C.head<2>() / p_C.z() - f.left()->normalised).norm();
       if (distance < least) least = distance, best = p_G;
     }
     return best;

@@ -12,9 +12,8 @@ void RestDetector::start(const TrackedFrame& frame) {
   reference_.clear();
   since_ = frame.t;
   for (const TrackedFeature& f : frame.features) {
-    Pixels& pixels = reference_[f.id];
-    if (f.left) pixels.left = f.left->pixel;
-    if (f.right) pixels.right = f.right->pixel;
+    Sights& sights = reference_[f.id];
+    for (const Observation& o : f.seen) sights.push_back({o.camera, o.pixel});
   }
 }
 
@@ -39,8 +38,12 @@ Duration RestDetector::update(const TrackedFrame& frame) {
   for (const TrackedFeature& f : frame.features) {
     const auto before = reference_.find(f.id);
     if (before == reference_.end()) continue;
-    if (f.left && before->second.left) motion.push_back((f.left->pixel - *before->second.left).norm());
-    else if (f.right && before->second.right) motion.push_back((f.right->pixel - *before->second.right).norm());
+    for (const Observation& o : f.seen) {  // the first camera that saw it both times
+      const auto then = std::ranges::find(before->second, o.camera, &Sight::camera);
+      if (then == before->second.end()) continue;
+      motion.push_back((o.pixel - then->pixel).norm());
+      break;
+    }
   }
   const bool enough = static_cast<int>(motion.size()) >= options_.min_features;
   if (!enough || !imu_is_quiet(frame.imu) || median(motion) >= options_.max_motion_px) {

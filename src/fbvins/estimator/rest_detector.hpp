@@ -3,7 +3,6 @@
 // drift ends it, which motion from frame to frame would not show; and the IMU's readings must be quiet.
 #pragma once
 
-#include <optional>
 #include <unordered_map>
 
 #include "fbvins/types/tracking.hpp"
@@ -31,10 +30,12 @@ class RestDetector {
 
   RestDetectorOptions options_;
   Time since_;
-  struct Pixels {
-    std::optional<Vec2> left, right;
+  struct Sight {
+    int camera;
+    Vec2 pixel;
   };
-  std::unordered_map<TrackId, Pixels> reference_;  ///< at the beginning of the rest
+  using Sights = FixedList<Sight, kMostCameras>;
+  std::unordered_map<TrackId, Sights> reference_;  ///< at the beginning of the rest
 };
 
 }  // namespace fbvins

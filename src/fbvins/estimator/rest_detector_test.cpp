@@ -13,7 +13,7 @@ TrackedFrame frame(int k, double drift_px = 0, double shake_radps = 0) {
   for (int i = 0; i < 30; ++i) {
     TrackedFeature feature;
     feature.id = TrackId{i};
-    feature.left.emplace().pixel = Vec2(20 * i + drift_px * k, 100);
+    feature.see(0, Observation{.pixel = Vec2(20 * i + drift_px * k, 100)});
     f.features.push_back(feature);
   }
   for (int i = 0; i <= 10; ++i)

@@ -15,16 +15,17 @@ namespace {
 void keep_most_observed(std::vector<const Landmark*>& landmarks, int limit) {
   int spare = limit - static_cast<int>(landmarks.size());
   if (spare >= 0) return;
-  std::vector<int> seen_by;  // number of landmarks with so many observations
+  std::vector<int> seen_by;  // number of landmarks seen by so many frames
   for (const Landmark* l : landmarks) {
-    if (seen_by.size() <= l->observations.size()) seen_by.resize(l->observations.size() + 1);
-    ++seen_by[l->observations.size()];
+    const auto frames = static_cast<std::size_t>(l->frame_count());
+    if (seen_by.size() <= frames) seen_by.resize(frames + 1);
+    ++seen_by[frames];
   }
-  std::size_t least = 0;  // observations: those with fewer leave
-  while (spare < 0) spare += seen_by[least++];
-  // Of those with the fewest that are left out the oldest fill up what is spare.
+  int least = 0;  // frames: landmarks seen by fewer leave
+  while (spare < 0) spare += seen_by[static_cast<std::size_t>(least++)];
+  // Of those seen by the fewest that are left out the oldest fill up what is spare.
   std::erase_if(landmarks, [&](const Landmark* l) {
-    const std::size_t n = l->observations.size();
+    const int n = l->frame_count();
     return n < least && (n + 1 < least || spare-- <= 0);
   });
 }
@@ -115,19 +116,24 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
   for (const TrackedFeature& feature : features) {
     if (landmarks_.rejected(feature.id)) continue;
     auto [landmark, is_new] = landmarks_.of_track(feature.id);
-    if (is_new) landmark.prior = known_.find(feature.id), landmark.cameras = feature.cameras;
-    StereoObservation observation{newest.id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
-    if (landmark.observations.empty()) {
-      landmark.host = newest.id;
-    } else {
-      StereoObservation& before = landmark.observations.back();
-      set_velocities(before, observation, (newest.t - frames_.at(before.frame).t).seconds());
-    }
-    landmark.observations.push_back(observation);
+    if (is_new) landmark.prior = known_.find(feature.id), landmark.lead = feature.lead;
+    if (landmark.observations.empty()) landmark.host = newest.id;
+    add_observations(landmark, feature);
     if (landmark.triangulated) continue;
     landmark.triangulated = triangulate(landmark, frames_, calibration);
     if (landmark.triangulated && landmark.prior) refuse_distant_prior(landmark, calibration);
   }
+}
+
+void SlidingWindow::add_observations(Landmark& landmark, const TrackedFeature& feature) const {
+  std::vector<Sighting>& all = landmark.observations;
+  const std::size_t older = all.size(), of_last = older == 0 ? 0 : landmark.newest().size();
+  if (older == 0) all.reserve(feature.seen.size());
+  for (const Observation& o : feature.seen) all.push_back({frames_.newest().id, o});
+  if (older == 0) return;
+  const std::span<Sighting> before(all.data() + older - of_last, of_last);
+  set_velocities(before, {all.data() + older, feature.seen.size()},
+                 (frames_.newest().t - frames_.at(before.front().frame).t).seconds());
 }
 
 void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& out) const {
@@ -145,24 +151,22 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
 
   std::vector<const Landmark*> chosen;
   for (const Landmark& l : landmarks_.all())
-    if (l.triangulated && l.observations.size() >= 2) chosen.push_back(&l);
+    if (l.triangulated && l.by_several_frames()) chosen.push_back(&l);
   keep_most_observed(chosen, options_.max_landmarks);
   for (const Landmark* landmark : chosen) {
     WindowLandmark l;
     l.id = landmark->id;
     l.host = frames_.index_of(landmark->host);
-    l.camera = landmark->ray_camera();
+    l.camera = landmark->ray_camera;
     l.alpha_beta_rho = landmark->alpha_beta_rho;
     l.first_observation = static_cast<int>(out.observations.size());
-    for (const StereoObservation& s : landmark->observations) {
-      const int frame = frames_.index_of(s.frame);
-      const auto [left, right] = landmark->cameras;
-      const auto add = [&](const Observation& o, int camera, const Vec2& velocity) {
-        const Vec3 displacement_B = o.after_s == 0 ? Vec3::Zero() : o.displacement_B(frames_[frame].state.v_B());
-        out.observations.push_back({frame, camera, o.normalised, velocity, o.sqrt_information, o.rows, displacement_B});
-      };
-      if (s.left) add(*s.left, left, s.left_velocity);
-      if (s.right) add(*s.right, right, s.right_velocity);
+    FrameId id;
+    int frame = -1;
+    for (const Sighting& s : landmark->observations) {
+      if (s.frame != id) id = s.frame, frame = frames_.index_of(id);
+      const Observation& o = s.seen;
+      const Vec3 displacement_B = o.after_s == 0 ? Vec3::Zero() : o.displacement_B(frames_[frame].state.v_B());
+      out.observations.push_back({frame, o.camera, o.normalised, s.velocity, o.sqrt_information, o.rows, displacement_B});
     }
     l.observation_count = static_cast<int>(out.observations.size()) - l.first_observation;
     if (landmark->prior) {
@@ -193,9 +197,7 @@ void SlidingWindow::take_estimates(const WindowProblem& solved) {
 
 void SlidingWindow::forget_observations(FrameId frame, const Calibration& calibration) {
   for (Landmark& landmark : landmarks_.all()) {
-    const StereoObservation* observation = landmark.observation_in(frame);
-    if (observation == nullptr) continue;
-    landmark.observations.erase(landmark.observations.begin() + (observation - landmark.observations.data()));
+    if (std::erase_if(landmark.observations, [&](const Sighting& s) { return s.frame == frame; }) == 0) continue;
     if (!landmark.observations.empty() && landmark.host == frame)
       rehost(landmark, landmark.observations.front().frame, frames_, calibration);
   }
@@ -276,7 +278,7 @@ void SlidingWindow::keep_newest_observations(const WindowProblem& problem, const
                                              const Calibration& calibration) {
   Landmark& landmark = *landmarks_.find(problem.landmarks[leaving.index].id);
   std::erase_if(landmark.observations,
-                [&](const StereoObservation& s) { return !leaving.in_view || frames_.index_of(s.frame) < newest_begin; });
+                [&](const Sighting& s) { return !leaving.in_view || frames_.index_of(s.frame) < newest_begin; });
   if (!landmark.observations.empty()) rehost(landmark, landmark.observations.front().frame, frames_, calibration);
 }
 

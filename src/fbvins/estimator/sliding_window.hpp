@@ -77,6 +77,7 @@ class SlidingWindow {
   const KnownLandmarks& known() const { return known_; }
 
  private:
+  void add_observations(Landmark& landmark, const TrackedFeature& feature) const;
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);
   void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);

@@ -23,14 +23,11 @@ int remove_far_observations(Landmark& landmark, const WindowProblem& solved, con
     const WindowObservation& o = solved.observations[numbers.first_observation + k];
     if (!(residuals[static_cast<std::size_t>(k)].norm() > kOutlier_sigma)) continue;
     ++removed;
-    const StereoObservation* s = landmark.observation_in(solved.frames[o.frame].id);
-    if (s == nullptr) continue;
-    StereoObservation& observation = landmark.observations[static_cast<std::size_t>(s - landmark.observations.data())];
-    // The right position was found from the left one: it goes with it.
-    if (o.camera == landmark.cameras.left) observation.left.reset();
-    observation.right.reset();
+    // The positions in other cameras were found from the lead's: they go with it.
+    std::erase_if(landmark.observations, [&](const Sighting& s) {
+      return s.frame == solved.frames[o.frame].id && (s.seen.camera == o.camera || o.camera == landmark.lead);
+    });
   }
-  std::erase_if(landmark.observations, [](const StereoObservation& s) { return !s.left && !s.right; });
   return removed;
 }
 
@@ -55,7 +52,7 @@ int SlidingWindow::remove_outliers(const WindowProblem& solved) {
 void SlidingWindow::count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
   landmark.outlier_count += 1;
   const bool too_near = numbers.alpha_beta_rho.z() > 1.0 / kNearestLandmark_m;
-  if (landmark.observations.size() < 2 || landmark.outlier_count >= LandmarkTable::kOutliersUntilRejected || too_near) {
+  if (!landmark.by_several_frames() || landmark.outlier_count >= LandmarkTable::kOutliersUntilRejected || too_near) {
     landmarks_.keep_outlier_count(landmark);
     landmark.observations.clear();
   } else if (landmark.observations.front().frame != landmark.host && !landmark.seen_in(landmark.host)) {
@@ -75,7 +72,7 @@ int SlidingWindow::refuse_landmark_priors(const WindowProblem& solved) {
 
 /// A landmark very far from its prior is another one; its factor would spoil the solve.
 void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& calibration) {
-  const WindowLandmark numbers{.camera = landmark.ray_camera(), .alpha_beta_rho = landmark.alpha_beta_rho};
+  const WindowLandmark numbers{.camera = landmark.ray_camera, .alpha_beta_rho = landmark.alpha_beta_rho};
   const Pose<G, B>& host = frames_.at(landmark.host).state.T_FB;
   const double distance_sigma = landmark_prior_residual(CameraGeometry(calibration), host, numbers, *landmark.prior).norm();
   if (distance_sigma < kFarFromPrior * kPriorOutlier_sigma) return;

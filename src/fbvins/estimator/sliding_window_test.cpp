@@ -55,9 +55,9 @@ struct Scene {
     const Vec3 p_B = state_at(k).T_FB.inverse() * points_G.at(track);
     TrackedFeature f;
     f.id = TrackId{track};
-    f.left = seen_at(p_B);
-    f.left->normalised += left_shift;
-    if (stereo) f.right = seen_at(calibration.T_BC1().inverse() * p_B);
+    f.see(0, seen_at(p_B));
+    f.by(0)->normalised += left_shift;
+    if (stereo) f.see(1, seen_at(calibration.T_BC1().inverse() * p_B));
     return f;
   }
   std::vector<TrackedFeature> all(int k, bool stereo = true) const {
@@ -109,14 +109,15 @@ TEST(SlidingWindow, FilesObservationsUnderTheirTracks) {
   s.add(1, {s.feature(3, 1), s.feature(4, 1, false)});
   EXPECT_EQ(s.window.frames().size(), 2);
   ASSERT_EQ(s.window.landmarks().all().size(), s.points_G.size());
-  EXPECT_EQ(s.landmark(3)->observations.size(), 2u);
-  EXPECT_TRUE(s.landmark(3)->observations[1].right.has_value());
-  EXPECT_FALSE(s.landmark(4)->observations[1].right.has_value());
-  EXPECT_EQ(s.landmark(5)->observations.size(), 1u);
+  EXPECT_EQ(s.landmark(3)->frame_count(), 2);
+  EXPECT_EQ(s.landmark(3)->seen_by_cameras(FrameId{1}).size(), 2u);
+  EXPECT_EQ(s.landmark(4)->seen_by_cameras(FrameId{1}).size(), 1u);
+  EXPECT_EQ(s.landmark(5)->frame_count(), 1);
   EXPECT_EQ(s.landmark(5)->host, FrameId{0});
   // 0.1 m in 50 ms, 2.3 m away: the velocity of both observations is that of their difference.
-  EXPECT_NEAR(s.landmark(3)->observations[0].left_velocity.x(), -kStep_m / 0.05 / 2.3, 1e-9);
-  EXPECT_EQ(s.landmark(3)->observations[0].left_velocity, s.landmark(3)->observations[1].left_velocity);
+  const std::span<const Sighting> before = s.landmark(3)->seen_by_cameras(FrameId{0}), now = s.landmark(3)->newest();
+  EXPECT_NEAR(before[0].velocity.x(), -kStep_m / 0.05 / 2.3, 1e-9);
+  EXPECT_EQ(before[0].velocity, now[0].velocity);
   EXPECT_EQ(landmarks_in_view(s.window), 2);
 }
 
@@ -201,7 +202,7 @@ TEST(SlidingWindow, AFrameThatIsDroppedLeavesItsReadingsToTheNext) {
   EXPECT_EQ(next.imu->size(), 21);
   // Landmarks it hosted are hosted by the next frame that sees them, and stay where they are.
   EXPECT_EQ(s.landmark(2)->host, FrameId{2});
-  EXPECT_EQ(s.landmark(2)->observations.size(), 2u);
+  EXPECT_EQ(s.landmark(2)->frame_count(), 2);
   EXPECT_LT((s.position_G(2) - s.points_G[2]).norm(), 1e-9);
 }
 
@@ -242,7 +243,7 @@ TEST(SlidingWindow, OutliersAreRemovedAndThreeSolvesWithOutliersRejectATrack) {
     EXPECT_EQ(s.window.remove_outliers(s.fill_problem()), 1) << round;
     if (round == 3) break;
     EXPECT_EQ(s.landmark(4)->outlier_count, round);
-    EXPECT_EQ(s.landmark(4)->observations.size(), 3u) << "the good ones stay";
+    EXPECT_EQ(s.landmark(4)->frame_count(), 3) << "the good ones stay";
   }
   EXPECT_EQ(s.landmark(4), nullptr);
   EXPECT_TRUE(s.window.landmarks().rejected(TrackId{4}));
@@ -257,11 +258,36 @@ TEST(SlidingWindow, ARightOutlierLeavesTheLeftObservation) {
   Scene s;
   for (int k = 0; k < 2; ++k) s.add(k, s.all(k));
   std::vector<TrackedFeature> features = s.all(2);
-  features[4].right->normalised.y() += 0.05;
+  features[4].by(1)->normalised.y() += 0.05;
   s.add(2, features);
   EXPECT_EQ(s.window.remove_outliers(s.fill_problem()), 1);
-  EXPECT_EQ(s.landmark(4)->observations.size(), 3u);
-  EXPECT_FALSE(s.landmark(4)->observations[2].right.has_value());
+  EXPECT_EQ(s.landmark(4)->frame_count(), 3);
+  ASSERT_EQ(s.landmark(4)->newest().size(), 1u);
+  EXPECT_EQ(s.landmark(4)->newest().front().seen.camera, 0);
+}
+
+TEST(SlidingWindow, WhatSeveralCamerasSeeIsAllThere) {
+  const auto flown = [](const Vec2& left_shift, double third_shift) {
+    Scene s;
+    s.calibration.cameras.push_back({Quat::Identity(), Vec3(0, -kBaseline_m, 0)});  // above the left one
+    for (int k = 0; k < 3; ++k) {
+      std::vector<TrackedFeature> features = s.all(k);
+      if (k == 2) features[4] = s.feature(4, k, true, left_shift);
+      for (TrackedFeature& f : features) {
+        const Vec3 p_B = state_at(k).T_FB.inverse() * s.points_G.at(static_cast<int>(f.id.value));
+        f.see(2, seen_at(s.calibration.T_BC(2).inverse() * p_B));
+      }
+      if (k == 2) features[4].by(2)->normalised.x() += third_shift;
+      s.add(k, features);
+    }
+    EXPECT_EQ(s.fill_problem().observations.size(), 3 * 3 * s.points_G.size());
+    EXPECT_LT((s.position_G(4) - s.points_G[4]).norm(), 1e-9);
+    s.window.remove_outliers(s.problem);
+    return s.landmark(4)->seen_by_cameras(FrameId{2}).size();
+  };
+  EXPECT_EQ(flown(Vec2::Zero(), 0), 3u);
+  EXPECT_EQ(flown(Vec2::Zero(), 0.05), 2u) << "the other two stay";
+  EXPECT_EQ(flown(Vec2(0, 0.05), 0), 0u) << "the others were found from the lead";
 }
 
 /// Keyframes 0 and 1, then three newest frames; track 0 is seen by the keyframes alone, track 1 by all.
@@ -281,7 +307,7 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreRemembered) {
   EXPECT_EQ(s.landmark(0), nullptr) << "out of view";
   ASSERT_NE(s.landmark(1), nullptr) << "in view: starts anew from the newest frames";
   EXPECT_EQ(s.landmark(1)->host, FrameId{2});
-  EXPECT_EQ(s.landmark(1)->observations.size(), 3u);
+  EXPECT_EQ(s.landmark(1)->frame_count(), 3);
   ASSERT_TRUE(s.landmark(1)->prior.has_value());
   EXPECT_LT((s.landmark(1)->prior->p_G - s.points_G[1]).norm(), 1e-6);
   const auto known = s.window.known().find(TrackId{0});

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "tests/support/jacobian_check.hpp"
 #include "tests/support/window_test_scene.hpp"
 
@@ -31,6 +33,36 @@ TEST(WindowEquations, GradientIsTheDerivativeOfTheCost) {
   EXPECT_NEAR(linearise(w.problem, pairs, equations), cost_of(w.problem, pairs), 1e-6);
   const auto cost = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
     return Eigen::VectorXd::Constant(1, cost_of(moved(w.problem, d), pairs));
+  };
+  const auto check = check_jacobian(cost, equations.g.transpose(), {{"cost", 1}},
+                                    {{"velocities and biases", 9 * kFrames}, {"tilt", 2}, {"poses", 6 * kFrames}}, 1e-6, 1e-5);
+  EXPECT_TRUE(check.ok) << check.message;
+}
+
+/// A third camera, beside the second one, sees what that sees.
+WindowProblem with_third_camera(WindowProblem w) {
+  w.calibration.cameras.push_back(w.calibration.T_BC(1) * Pose<C0, C0>(Quat::Identity(), Vec3(0.01, -0.02, 0)));
+  const std::vector<WindowObservation> by_two = std::exchange(w.observations, {});
+  for (WindowLandmark& l : w.landmarks) {
+    const auto begin = by_two.begin() + l.first_observation, end = begin + l.observation_count;
+    l.first_observation = static_cast<int>(w.observations.size());
+    for (auto o = begin; o != end; ++o) {
+      w.observations.push_back(*o);
+      if (o->camera == 1) w.observations.push_back(*o), w.observations.back().camera = 2;
+    }
+    l.observation_count = static_cast<int>(w.observations.size()) - l.first_observation;
+  }
+  return w;
+}
+
+TEST(WindowEquations, AnyNumberOfCamerasMaySeeALandmarkInAFrame) {
+  const WindowProblem two = test::make_window(false).problem, three = with_third_camera(two);
+  ASSERT_GT(three.observations.size(), 1.3 * static_cast<double>(two.observations.size()));
+  PairTable pairs;
+  NormalEquations equations;
+  EXPECT_NEAR(linearise(three, pairs, equations), cost_of(three, pairs), 1e-6);
+  const auto cost = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    return Eigen::VectorXd::Constant(1, cost_of(moved(three, d), pairs));
   };
   const auto check = check_jacobian(cost, equations.g.transpose(), {{"cost", 1}},
                                     {{"velocities and biases", 9 * kFrames}, {"tilt", 2}, {"poses", 6 * kFrames}}, 1e-6, 1e-5);

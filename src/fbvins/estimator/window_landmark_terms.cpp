@@ -16,7 +16,7 @@ namespace {
 /// What an observation without a projection costs: a residual of this many sigmas, with no slope.
 constexpr double kUnprojectableSigma = 100.0;
 
-/// One frame's observations of a landmark: two rows of each of the two cameras that may see it.
+/// A frame's observations of a landmark, two rows each: those of more cameras are added two by two.
 constexpr int kMostObservations = 2;
 template <int Columns>
 using ObservationRows = double[kMostObservations][2][Columns];
@@ -101,15 +101,15 @@ inline std::optional<WeighedResidual> weigh(const WindowProblem& w, const Camera
   return out;
 }
 
-/// Linearises the observations of a landmark in one frame, `o` on: one row of Jacobian and residual for each coordinate, weighed
-/// robustly. Adds to `cost`; `o` is the first of another frame afterwards. Returns how many there are.
+/// Linearises observations of a landmark in one frame, `o` on: one row of Jacobian and residual for each coordinate, weighed
+/// robustly. Adds to `cost`; `o` is the next one afterwards, of another frame or beyond the two. Returns how many there are.
 template <int Columns>
 int linearise_observations(const WindowProblem& w, const CameraGeometry& cameras, const PairGeometry& pair,
                            const WindowLandmark& l, const Vec3& x_h, const WindowObservation*& o, const WindowObservation* end,
                            ObservationRows<Columns>& rows, double& cost) {
   const int target = o->frame;
   int observations = 0;
-  for (; o != end && o->frame == target; ++o) {
+  for (; o != end && o->frame == target && observations < kMostObservations; ++o) {
     const std::optional<WeighedResidual> seen = weigh(w, cameras, pair, l, x_h, *o, cost);
     if (!seen) continue;
     double(&observation)[2][Columns] = rows[observations++];

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/geometry/so3.hpp"
@@ -19,7 +20,7 @@ double parallax(const Mat3& R_ba, const Observation& a, const Observation& b) {
 
 /// In G.
 Vec3 position_of(const Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
-  const Pose<G, C0> T_GC = frames.at(landmark.host).state.T_FB * calibration.T_BC(landmark.ray_camera());
+  const Pose<G, C0> T_GC = frames.at(landmark.host).state.T_FB * calibration.T_BC(landmark.ray_camera);
   return T_GC * Vec3(Vec3(landmark.alpha_beta_rho.x(), landmark.alpha_beta_rho.y(), 1) / landmark.alpha_beta_rho.z());
 }
 
@@ -29,14 +30,14 @@ int landmarks_in_view(const SlidingWindow& window) {
   const FrameId newest = window.newest().id;
   const std::vector<Landmark>& landmarks = window.landmarks().all();
   return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) {
-    return l.triangulated && l.observations.back().frame == newest && l.observations.size() >= 2;
+    return l.triangulated && l.observations.back().frame == newest && l.by_several_frames();
   }));
 }
 
 std::vector<TrackId> tracks_in_view(const SlidingWindow& window) {
   std::vector<TrackId> out;
   for (const Landmark& l : window.landmarks().all())
-    if (l.triangulated && l.observations.back().frame == window.newest().id && l.observations.size() >= 3) out.push_back(l.track);
+    if (l.triangulated && l.observations.back().frame == window.newest().id && l.frame_count() >= 3) out.push_back(l.track);
   return out;
 }
 
@@ -74,11 +75,13 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
   for (const Landmark& l : window.landmarks().all()) {
     if (l.observations.back().frame != newest.id) continue;
     ++seen;
-    const StereoObservation* before = l.observation_in(keyframe.id);
-    if (before == nullptr) continue;
-    const StereoObservation& now = l.observations.back();
-    if (before->left && now.left) motion.push_back(moved_px(l.cameras.left, *before->left, *now.left));
-    else if (before->right && now.right) motion.push_back(moved_px(l.cameras.right, *before->right, *now.right));
+    const std::span<const Sighting> before = l.seen_by_cameras(keyframe.id);
+    for (const Sighting& now : l.newest()) {  // the first camera that saw it both times
+      const auto then = std::ranges::find_if(before, [&](const Sighting& s) { return s.seen.camera == now.seen.camera; });
+      if (then == before.end()) continue;
+      motion.push_back(moved_px(now.seen.camera, then->seen, now.seen));
+      break;
+    }
   }
   if (seen > 0) out.shared_ratio = static_cast<double>(motion.size()) / seen;
   out.parallax_px = median(motion);
@@ -127,7 +130,7 @@ WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calib
   for (const Landmark& l : window.landmarks().all()) {
     if (!l.triangulated) continue;
     const Vec3 p_W = tilt.levelled(position_of(l, window.frames(), calibration));
-    out.landmarks.push_back({l.id, l.track, p_W, static_cast<int>(l.observations.size())});
+    out.landmarks.push_back({l.id, l.track, p_W, l.frame_count()});
   }
   return out;
 }
@@ -142,11 +145,11 @@ Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& 
   out.v_WB = level.v_FB;
   out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
-    const StereoObservation* seen = l.triangulated ? l.observation_in(f.id) : nullptr;
-    if (seen == nullptr) continue;
+    const std::span<const Sighting> seen = l.seen_by_cameras(f.id);
+    if (!l.triangulated || seen.empty()) continue;
     const Vec3 p_C = scaled_point_in_camera(l, f, window.frames(), calibration) / l.alpha_beta_rho.z();
-    const Observation& shown = seen->left ? *seen->left : *seen->right;
-    out.landmarks.push_back({l.track, shown.pixel, calibration.T_BC(l.cameras.left) * p_C, l.cameras[!seen->left]});
+    const Observation& shown = seen.front().seen;
+    out.landmarks.push_back({l.track, shown.pixel, calibration.T_BC(l.lead) * p_C, shown.camera});
   }
   return out;
 }

@@ -45,13 +45,13 @@ TEST_P(DepthImageIn, EachFeatureOnItHasADepth) {
     EXPECT_TRUE(frame.has(0) && frame.has(1));
     int with_depth = 0, beside = 0;
     for (const TrackedFeature& f : frame.features) {
-      ASSERT_TRUE(f.left);
-      const double x_px = f.left->pixel.x();
-      if (x_px < 117) beside += f.right.has_value();
-      if (!f.right) continue;
+      ASSERT_TRUE(f.left());
+      const double x_px = f.left()->pixel.x();
+      if (x_px < 117) beside += f.by_several();
+      if (!f.right()) continue;
       ++with_depth;
-      EXPECT_NEAR(f.left->normalised.x() - f.right->normalised.x(), kDepthBaseline_m / TestWall::kDepth_m, 1e-6);
-      const Mat2& information = f.right->sqrt_information;
+      EXPECT_NEAR(f.left()->normalised.x() - f.right()->normalised.x(), kDepthBaseline_m / TestWall::kDepth_m, 1e-6);
+      const Mat2& information = f.right()->sqrt_information;
       EXPECT_NEAR(1 / (kDepthBaseline_m * information(0, 0)), 0.003, 0.0005);
       EXPECT_TRUE(information(1, 1) == 0 && information(0, 1) == 0 && information(1, 0) == 0);
     }
@@ -69,7 +69,7 @@ TEST_P(DepthImageIn, WithoutItTracksGoOn) {
     EXPECT_TRUE(frame.has(0));
     EXPECT_FALSE(frame.has(1));
     EXPECT_GT(frame.stats.tracked, 30);
-    EXPECT_TRUE(std::ranges::none_of(frame.features, [](const TrackedFeature& f) { return f.right.has_value(); }));
+    EXPECT_TRUE(std::ranges::none_of(frame.features, &TrackedFeature::by_several));
   }
 }
 

@@ -17,7 +17,10 @@ SensorPacket mirrored(SensorPacket packet) {
 }
 
 TrackedFrame mirrored(TrackedFrame frame) {
-  for (TrackedFeature& feature : frame.features) std::swap(feature.left, feature.right);
+  for (TrackedFeature& feature : frame.features) {
+    const auto seen = std::exchange(feature.seen, {});
+    for (const Observation& o : seen) feature.see(1 - o.camera, o);
+  }
   frame.cameras = {frame.has(1), frame.has(0)};
   std::swap(frame.stats.mean_brightness_left, frame.stats.mean_brightness_right);
   return frame;

@@ -30,8 +30,8 @@ SensorPacket packet(int k, bool left, bool right) {
 
 /// Where a feature is on the wall, m, as either camera sees it.
 Vec2 on_wall(int k, const TrackedFeature& f) {
-  const Vec2 seen = f.left ? f.left->normalised : f.right->normalised;
-  return Vec2(x_m(k) + (f.left ? 0 : TestWall::kBaseline_m), 0) + TestWall::kDepth_m * seen;
+  const Vec2 seen = f.left() ? f.left()->normalised : f.right()->normalised;
+  return Vec2(x_m(k) + (f.left() ? 0 : TestWall::kBaseline_m), 0) + TestWall::kDepth_m * seen;
 }
 
 int shared(const TrackedFrame& a, const TrackedFrame& b) {
@@ -44,7 +44,7 @@ int shared(const TrackedFrame& a, const TrackedFrame& b) {
 
 int with_both(const TrackedFrame& frame) {
   int n = 0;
-  for (const TrackedFeature& f : frame.features) n += f.left && f.right;
+  for (const TrackedFeature& f : frame.features) n += f.by_several();
   return n;
 }
 
@@ -61,9 +61,9 @@ class EitherCameraOf : public testing::TestWithParam<const char*> {
     int strayed = 0;
     for (const TrackedFeature& f : frame.features) {
       EXPECT_TRUE(ids.insert(f.id).second) << "twice in frame " << k;
-      EXPECT_TRUE(f.left || f.right);
-      EXPECT_TRUE(left || !f.left);
-      EXPECT_TRUE(right || !f.right);
+      EXPECT_FALSE(f.seen.empty());
+      EXPECT_TRUE(left || !f.left());
+      EXPECT_TRUE(right || !f.right());
       const Vec2 place = on_wall(k, f);
       strayed += (place - places_.try_emplace(f.id, place).first->second).norm() > 0.03;  // 2 px
     }

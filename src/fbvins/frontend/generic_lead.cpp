@@ -38,12 +38,11 @@ std::optional<TrackId> GenericLead::own(TrackId outside) const {
 }
 
 bool GenericLead::is_usable_feature(const TrackedFeature& feature) const {
-  const auto seen = [](const std::optional<Observation>& observation, const Camera& camera) {
-    return observation->pixel.allFinite() && observation->normalised.allFinite() && observation->sqrt_information.allFinite() &&
-           !camera.hidden(observation->pixel, 0);
+  const auto is_usable = [this](const Observation& o) {
+    return (o.camera == 0 || o.camera == 1) && o.pixel.allFinite() && o.normalised.allFinite() &&
+           o.sqrt_information.allFinite() && !rig_.camera(o.camera).hidden(o.pixel, 0);
   };
-  if (!feature.left && !feature.right) return false;
-  return (!feature.left || seen(feature.left, rig_.left())) && (!feature.right || seen(feature.right, rig_.right()));
+  return !feature.seen.empty() && std::ranges::all_of(feature.seen, is_usable);
 }
 
 TrackedFrame GenericLead::process(const SensorPacket& packet, const StatePrior& prior) {

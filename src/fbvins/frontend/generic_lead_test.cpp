@@ -26,8 +26,10 @@ struct Counting final : Frontend {
   TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
     TrackedFrame out;
     if (!packet.frame.left()) return out;
-    out.features.push_back({TrackId{0}, observe(camera, Vec2(50, 60), 1.0), std::nullopt});
-    out.features.push_back({TrackId{next++}, observe(camera, Vec2(150, 60), 1.0), std::nullopt});
+    out.features.resize(2);
+    out.features[0].id = TrackId{0}, out.features[1].id = TrackId{next++};
+    out.features[0].see(0, observe(camera, Vec2(50, 60), 1.0));
+    out.features[1].see(0, observe(camera, Vec2(150, 60), 1.0));
     return out;
   }
   void locate(const LandmarkUpdate& update) override {
@@ -58,8 +60,8 @@ TEST(GenericLead, ACameraThatFailsIsReplacedByTheOtherOneWithNewTracks) {
     EXPECT_TRUE(frame.has(1));
     ASSERT_EQ(frame.features.size(), 2U);
     for (const TrackedFeature& f : frame.features) {
-      EXPECT_FALSE(f.left);
-      EXPECT_TRUE(f.right);
+      EXPECT_FALSE(f.left());
+      EXPECT_TRUE(f.right());
       of_right.insert(f.id);
     }
   }
@@ -103,9 +105,12 @@ TEST(GenericLead, WhatAMaskHidesOrIsNoNumberIsLeftOut) {
       for (const double u : {20.0, 200.0, std::numeric_limits<double>::quiet_NaN()}) {
         Observation seen = *observe(camera(), Vec2(200, 100), 1.0);
         seen.pixel.x() = u;
-        out.features.push_back({TrackId{static_cast<std::int64_t>(out.features.size())}, seen, std::nullopt});
+        out.features.push_back({TrackId{static_cast<std::int64_t>(out.features.size())}});
+        out.features.back().see(0, seen);
       }
-      out.features.push_back({TrackId{9}, std::nullopt, std::nullopt});
+      out.features.push_back({TrackId{9}});
+      out.features.push_back({TrackId{10}});
+      out.features.back().see(5, observe(camera(), Vec2(200, 100), 1.0));  // no camera of the pair
       return out;
     }
   };
@@ -117,7 +122,7 @@ TEST(GenericLead, WhatAMaskHidesOrIsNoNumberIsLeftOut) {
   GenericLead lead(rig, [](const StereoRig&) { return std::make_unique<Spoilt>(); });
   const TrackedFrame frame = lead.process(packet(0, true, true), {});
   ASSERT_EQ(frame.features.size(), 1U);
-  EXPECT_EQ(frame.features[0].left->pixel.x(), 200);
+  EXPECT_EQ(frame.features[0].left()->pixel.x(), 200);
 }
 
 }  // namespace generic_lead_test

@@ -21,9 +21,9 @@ void add_epipolar_errors(const StereoRig& rig, const TrackedFrame& frame, std::v
   const Pose<C1, C0> T_C1C0 = rig.T_C1C0();
   const Mat3 E = hat(T_C1C0.p) * T_C1C0.R();
   for (const TrackedFeature& feature : frame.features) {
-    if (!feature.right) continue;
-    const Vec3 line = E * feature.left->normalised.homogeneous();
-    errors.push_back(std::abs(feature.right->normalised.homogeneous().dot(line)) / line.head<2>().norm() *
+    if (!feature.right()) continue;
+    const Vec3 line = E * feature.left()->normalised.homogeneous();
+    errors.push_back(std::abs(feature.right()->normalised.homogeneous().dot(line)) / line.head<2>().norm() *
                      rig.right().focal_px());
   }
 }

@@ -31,10 +31,10 @@ TEST(FeaturesOf, AreThoseOfTheTracksInSight) {
   const std::vector<TrackedFeature> features = features_of(tracks, kCamera, 1);
   ASSERT_EQ(features.size(), 2u);
   EXPECT_EQ(features[0].id, TrackId{0});
-  EXPECT_FALSE(features[0].right);
+  EXPECT_FALSE(features[0].right());
   EXPECT_EQ(features[1].id, TrackId{2});
   EXPECT_EQ(features[1].age_frames, 7);
-  EXPECT_EQ(features[1].right.value().pixel, Vec2(100, 50));
+  EXPECT_EQ(features[1].right()->pixel, Vec2(100, 50));
 }
 
 }  // namespace observe_test

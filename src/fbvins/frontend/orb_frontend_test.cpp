@@ -28,7 +28,7 @@ double median_error_px(const std::vector<TrackedFrame>& frames) {
   std::vector<double> errors;
   for (std::size_t k = 0; k < frames.size(); ++k)
     for (const TrackedFeature& f : frames[k].features) {
-      const Vec2 p = world().wall_point(static_cast<int>(k), f.left->normalised);
+      const Vec2 p = world().wall_point(static_cast<int>(k), f.left()->normalised);
       const auto [it, is_new] = first.try_emplace(f.id.value, p);
       if (!is_new) errors.push_back((p - it->second).norm() / kDepth_m * 230);
     }
@@ -62,7 +62,7 @@ TEST(OrbFrontend, FollowsAWallThroughWideLensesAndSeesItsDepth) {
     std::vector<double> depths_m;
     for (const TrackedFrame& frame : frames)
       for (const TrackedFeature& f : frame.features)
-        if (f.right) depths_m.push_back(0.11 / (f.left->normalised - f.right->normalised).x());
+        if (f.right()) depths_m.push_back(0.11 / (f.left()->normalised - f.right()->normalised).x());
     ASSERT_GT(depths_m.size(), 150u) << rig.left().model_name();
     std::nth_element(depths_m.begin(), depths_m.begin() + std::ssize(depths_m) / 2, depths_m.end());
     EXPECT_NEAR(depths_m[depths_m.size() / 2], kDepth_m, 0.03) << rig.left().model_name();
@@ -75,11 +75,11 @@ TEST(OrbFrontend, StereoGivesTheWallsDepth) {
   for (const TrackedFrame& frame : frames)
     for (const TrackedFeature& f : frame.features) {
       ++all;
-      if (!f.right) continue;
+      if (!f.right()) continue;
       ++stereo;
-      const double disparity_px = (f.left->normalised - f.right->normalised).x() * 230;
+      const double disparity_px = (f.left()->normalised - f.right()->normalised).x() * 230;
       EXPECT_NEAR(disparity_px, 0.11 / kDepth_m * 230, 0.6);
-      EXPECT_NEAR((f.left->normalised - f.right->normalised).y() * 230, 0, 0.6);
+      EXPECT_NEAR((f.left()->normalised - f.right()->normalised).y() * 230, 0, 0.6);
     }
   EXPECT_GT(stereo, 0.7 * all);
 }
@@ -88,8 +88,8 @@ TEST(OrbFrontend, ObservationsAreConsistent) {
   const auto frames = run({packets().begin(), packets().begin() + 3});
   for (const TrackedFeature& f : frames.back().features) {
     Mat2 J;
-    EXPECT_LT((world().rig.left().distort(f.left->normalised, &J) - f.left->pixel).norm(), 1e-6);
-    EXPECT_LT((f.left->sqrt_information - J / small_options().sigma_px).norm(), 1e-9);
+    EXPECT_LT((world().rig.left().distort(f.left()->normalised, &J) - f.left()->pixel).norm(), 1e-6);
+    EXPECT_LT((f.left()->sqrt_information - J / small_options().sigma_px).norm(), 1e-9);
   }
 }
 
@@ -148,8 +148,8 @@ TEST(OrbFrontend, SameInputSameBits) {
     ASSERT_EQ(a[k].features.size(), b[k].features.size());
     for (std::size_t i = 0; i < a[k].features.size(); ++i) {
       EXPECT_EQ(a[k].features[i].id, b[k].features[i].id);
-      EXPECT_TRUE(a[k].features[i].left->pixel == b[k].features[i].left->pixel);
-      EXPECT_EQ(a[k].features[i].right.has_value(), b[k].features[i].right.has_value());
+      EXPECT_TRUE(a[k].features[i].left()->pixel == b[k].features[i].left()->pixel);
+      EXPECT_EQ(a[k].features[i].by_several(), b[k].features[i].by_several());
     }
   }
 }
@@ -167,9 +167,9 @@ TEST(OrbFrontend, HasNoFeatureInTheMask) {
   for (const TrackedFrame& frame : run(packets(), small_options(), rig)) {
     EXPECT_GT(frame.features.size(), 40u);
     for (const TrackedFeature& feature : frame.features) {
-      EXPECT_FALSE(rig.left().hidden(feature.left->pixel, kPatchBorder_px));
-      if (!feature.right) continue;
-      EXPECT_FALSE(rig.right().hidden(feature.right->pixel, kPatchBorder_px));
+      EXPECT_FALSE(rig.left().hidden(feature.left()->pixel, kPatchBorder_px));
+      if (!feature.right()) continue;
+      EXPECT_FALSE(rig.right().hidden(feature.right()->pixel, kPatchBorder_px));
       ++in_right;
     }
   }

@@ -54,9 +54,9 @@ Tally run(const std::filesystem::path& folder, int max_frames) {
     tally.stereo += frame.stats.stereo;
     tally.tracked += frame.stats.tracked;
     for (const TrackedFeature& f : frame.features) {
-      if (!f.right) continue;
-      const Vec3 line = E * f.left->normalised.homogeneous();
-      tally.epipolar_px.push_back(std::abs(f.right->normalised.homogeneous().dot(line)) / line.head<2>().norm() *
+      if (!f.right()) continue;
+      const Vec3 line = E * f.left()->normalised.homogeneous();
+      tally.epipolar_px.push_back(std::abs(f.right()->normalised.homogeneous().dot(line)) / line.head<2>().norm() *
                                   data.rig().right().focal_px());
     }
   }

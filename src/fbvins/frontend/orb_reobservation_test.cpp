@@ -36,7 +36,7 @@ TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFra
       LandmarkUpdate update;
       for (const TrackedFrame& frame : before)
         for (const TrackedFeature& f : frame.features) {
-          const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left->normalised);
+          const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left()->normalised);
           update.landmarks.push_back({f.id, Vec3(p.x(), p.y(), kDepth_m)});
         }
       frontend.locate(update);
@@ -60,7 +60,7 @@ TEST(OrbFrontend, LandmarksAreReobservedHoweverLongTheyWereOutOfView) {
     int again = 0, wrong = 0;
     for (const TrackedFrame& frame : frames)
       for (const TrackedFeature& f : frame.features) {
-        const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left->normalised);
+        const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left()->normalised);
         const auto [it, is_new] = first.try_emplace(f.id.value, p);
         if (is_new || frame.id != frames.back().id) continue;
         ++again;
@@ -150,8 +150,8 @@ class Sweep {
     for (const TrackedFeature& f : frame.features) {
       Known& landmark = known[f.id];
       if (landmark.told) landmark.again = true;
-      else landmark.p_G = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left->normalised.homogeneous());
-      landmark.px = f.left->pixel;
+      else landmark.p_G = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left()->normalised.homogeneous());
+      landmark.px = f.left()->pixel;
       landmark.last = k;
       ++landmark.frames;
     }

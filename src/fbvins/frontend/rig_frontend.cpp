@@ -13,10 +13,6 @@ SensorPacket of_group(const SensorPacket& packet, const CameraGroup& group) {
   return {packet.id, images_of(packet.frame, group), packet.imu};
 }
 
-CameraPair cameras_of(const CameraGroup& group) {
-  return {static_cast<std::int8_t>(group.first), static_cast<std::int8_t>(group.second.value_or(group.first))};
-}
-
 /// Sums; brightness and motion are those of the group with the most tracks.
 void add(FrontendStats& sum, const FrontendStats& of_group) {
   if (of_group.tracked > sum.tracked || sum.mean_brightness_left == 0) {
@@ -64,7 +60,9 @@ TrackedFrame RigFrontend::process(const SensorPacket& packet, const StatePrior& 
 void RigFrontend::take_features(std::vector<TrackedFeature> features, std::size_t group, std::vector<TrackedFeature>& out) const {
   for (TrackedFeature& feature : features) {
     feature.id = rig_wide(feature.id, group);
-    feature.cameras = cameras_of(groups_[group]);
+    feature.lead = groups_[group].first;
+    for (Observation& o : feature.seen)
+      o.camera = o.camera == 0 ? groups_[group].first : groups_[group].second.value_or(o.camera);
     out.push_back(std::move(feature));
   }
 }

@@ -42,10 +42,8 @@ SensorPacket packet(int k, bool front = true, bool back = true) {
 
 std::map<int, int> features_by_camera(const TrackedFrame& frame) {
   std::map<int, int> count;
-  for (const TrackedFeature& f : frame.features) {
-    count[f.cameras.left] += f.left.has_value();
-    count[f.cameras.right] += f.right.has_value();
-  }
+  for (const TrackedFeature& f : frame.features)
+    for (const Observation& o : f.seen) ++count[o.camera];
   return count;
 }
 
@@ -63,11 +61,12 @@ TEST_P(RigFrontendOf, EachPairHasItsFeatures) {
     std::map<int, int> count = features_by_camera(frame);
     for (int c = 0; c < 4; ++c) EXPECT_GT(count[c], 30) << "camera " << c << ", image " << k;
     for (const TrackedFeature& f : frame.features) {
-      EXPECT_EQ(f.cameras.right, f.cameras.left + 1);
-      const auto [at, is_new] = cameras.try_emplace(f.id, f.cameras.left);
-      EXPECT_EQ(at->second, f.cameras.left) << "a track has moved to another pair";
+      EXPECT_TRUE(f.lead == 0 || f.lead == 2);
+      for (const Observation& o : f.seen) EXPECT_TRUE(o.camera == f.lead || o.camera == f.lead + 1);
+      const auto [at, is_new] = cameras.try_emplace(f.id, f.lead);
+      EXPECT_EQ(at->second, f.lead) << "a track has moved to another pair";
     }
-    EXPECT_EQ(frame.stats.stereo, std::ranges::count_if(frame.features, [](const auto& f) { return f.left && f.right; }));
+    EXPECT_EQ(frame.stats.stereo, std::ranges::count_if(frame.features, &TrackedFeature::by_several));
   }
 }
 
@@ -107,7 +106,7 @@ struct Listener final : Frontend {
     frame.id = packet.id;
     TrackedFeature feature;
     feature.id = TrackId{7};
-    feature.left = Observation{};
+    feature.see(0, Observation{});
     frame.features = {feature};
     return frame;
   }

@@ -93,11 +93,12 @@ GyroAlignment::View GyroAlignment::view_of(const TrackedFrame& frame, Time t) co
   View view{t, {}};
   view.sights.reserve(frame.features.size());
   for (const TrackedFeature& f : frame.features) {
-    if (!f.left || f.cameras.left != 0) continue;
-    const Vec3 ray = f.left->normalised.homogeneous();
+    const Observation* o = f.lead == 0 ? f.by(0) : nullptr;
+    if (!o) continue;
+    const Vec3 ray = o->normalised.homogeneous();
     const double norm = ray.norm();
-    const double sigma = 1 / (std::sqrt(std::abs(f.left->sqrt_information.determinant())) * norm);
-    view.sights.push_back({f.id, R_BC_ * (ray / norm), sigma, f.left->pixel.y() - middle_row_px_});
+    const double sigma = 1 / (std::sqrt(std::abs(o->sqrt_information.determinant())) * norm);
+    view.sights.push_back({f.id, R_BC_ * (ray / norm), sigma, o->pixel.y() - middle_row_px_});
   }
   if (!std::ranges::is_sorted(view.sights, {}, &Sight::id)) std::ranges::sort(view.sights, {}, &Sight::id);
   return view;

@@ -104,7 +104,7 @@ TEST(GyroAlignment, PairsThatDoNotFitCountForLittle) {
     const double t = (frame.t - Time{}).seconds() - 10;
     if (t > 2 && t < 4)
       for (TrackedFeature& f : frame.features)
-        f.left->normalised += Vec2(0.3 * (t - 2), 0) + 0.01 * Vec2(rng.normal(), rng.normal());
+        f.by(0)->normalised += Vec2(0.3 * (t - 2), 0) + 0.01 * Vec2(rng.normal(), rng.normal());
     alignment.add(frame, {});
   }
   const auto estimate = alignment.solve();

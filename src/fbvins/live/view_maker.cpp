@@ -14,11 +14,9 @@ void ViewMaker::add(const TrackedFrame& frame) {
   right_features_.clear();
   features_.reserve(frame.features.size());
   right_features_.reserve(frame.features.size());
-  for (const TrackedFeature& feature : frame.features) {
-    if (feature.left) features_.push_back({feature.id, feature.left->pixel, feature.age_frames, 0, feature.cameras.left});
-    if (feature.right)
-      right_features_.push_back({feature.id, feature.right->pixel, feature.age_frames, 0, feature.cameras.right});
-  }
+  for (const TrackedFeature& feature : frame.features)
+    for (const Observation& o : feature.seen)
+      (o.camera == feature.lead ? features_ : right_features_).push_back({feature.id, o.pixel, feature.age_frames, 0, o.camera});
 }
 
 LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {

@@ -12,7 +12,7 @@ TrackedFrame frame_with(Time t, std::initializer_list<std::int64_t> tracks) {
   for (const std::int64_t track : tracks) {
     TrackedFeature feature;
     feature.id = TrackId{track};
-    feature.left.emplace().pixel = Vec2(10. * static_cast<double>(track), 5);
+    feature.see(0, Observation{.pixel = Vec2(10. * static_cast<double>(track), 5)});
     feature.age_frames = static_cast<int>(track);
     frame.features.push_back(feature);
   }
@@ -42,7 +42,8 @@ StereoRig looking_ahead() {
 TEST(ViewMaker, FeaturesAreThoseOfTheirCamera) {
   ViewMaker views(looking_ahead());
   TrackedFrame frame = frame_with(Time{7}, {1, 2});
-  frame.features[1].cameras = {2, 3};
+  frame.features[1] = {.id = TrackId{2}, .lead = 2};
+  frame.features[1].see(2, Observation{});
   views.add(frame);
   WindowSnapshot window;
   window.frames.push_back({FrameId{0}, Time{7}, {}, true});
@@ -62,7 +63,7 @@ TEST(ViewMaker, WhatTheRightCameraSeesIsThereAsWell) {
   rig.cameras[1].T_BC = rig.T_BC0();
   ViewMaker views(rig);
   TrackedFrame frame = frame_with(Time{7}, {1, 2});
-  frame.features[0].right.emplace().pixel = Vec2(3, 4);
+  frame.features[0].see(1, Observation{.pixel = Vec2(3, 4)});
   views.add(frame);
   WindowSnapshot window;
   window.frames.push_back({FrameId{0}, Time{7}, {}, true});

@@ -96,9 +96,10 @@ struct SimulationOptions {
     v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
     v("sensors", sensors, "none|d435i|d435i-colour|oak-d|l515|phone|arducam-fc|adis16448",
       "whose lenses, mounting and IMU these are, in place of the calibration's; --sensors sets all other figures of theirs, too");
-    v("rig", rig, "stereo|mono|quad|sides|rgbd|fisheye|back-to-back",
+    v("rig", rig, "stereo|mono|quad|sides|trinocular|fan|rgbd|fisheye|back-to-back",
       "cameras: the two of the calibration; or the left one alone; or two more of the same kind that look backwards, or one to each "
-      "side; or the left one with a depth sensor; or two with lenses of 200 degrees, side by side or back to back");
+      "side; or one more above the two; or four like the left one, each turned by 40 degrees against the next; or the left one with a "
+      "depth sensor; or two with lenses of 200 degrees, side by side or back to back");
     v.group("flight", flight, "how the rig moves");
     v.group("recorded", recorded, "a recorded flight instead");
     v.group("imu", imu, "errors of the IMU");
