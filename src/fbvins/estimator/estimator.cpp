@@ -22,6 +22,9 @@ using namespace thresholds;
 constexpr double kRestForStandstill_s = 0.5;
 /// Share by which an accelerometer's axes and scale are off, of a sensor that was not calibrated up to twice as much.
 constexpr double kAxes = 0.015;
+/// Rotations and positions, rad and m, that are far below what an image tells: where steps so short no longer help, what is left
+/// is a landmark's depth, which the next image's linearisation improves.
+constexpr double kWorthLinearising = 1e-5;
 
 }  // namespace
 
@@ -139,7 +142,8 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   predicted.factors = factors_.make({frame, features, predicted, window_, calibration_, standstill});
   window_.add_frame(std::move(predicted), features, calibration_);
   stats.prepare_ms = timer.lap_ms();
-  const WindowSolution& solution = solve(out.odometry, LmOptions{.max_iterations = options_.max_iterations});
+  const WindowSolution& solution =
+      solve(out.odometry, LmOptions{.max_iterations = options_.max_iterations, .worth_linearising = kWorthLinearising});
   timer.lap_ms();
   stats.standstill = standstill;
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);

@@ -21,6 +21,8 @@ class DetectionPolicy {
     if (detected)
       observed_then_ = std::max<double>(observed, observed_then_ / 2);  // a dark image does not lower it to zero at once
   }
+  /// Tracks that were added to those of the last image with keypoints, afterwards.
+  void add(int tracks) { observed_then_ += tracks; }
 
  private:
   /// Most images in a row without, and the share of the tracks of the last one with, below which there is another.

@@ -30,6 +30,14 @@ TEST(DetectionPolicy, AtOnceWhenTracksAreLost) {
   EXPECT_TRUE(policy.due(79));
 }
 
+TEST(DetectionPolicy, TracksThatWereAddedCount) {
+  DetectionPolicy policy;
+  policy.pass(true, 80);
+  policy.add(20);
+  EXPECT_FALSE(policy.due(81));
+  EXPECT_TRUE(policy.due(79));
+}
+
 TEST(DetectionPolicy, EveryImageWhileAllIsDarkAndTheFirstAfterIt) {
   DetectionPolicy policy;
   policy.pass(true, 100);

@@ -191,7 +191,7 @@ bool KltFrontend::measure_depth(KltTrack& track) {
   }
   if (images_.right().empty()) return false;
   const StereoMatch match = stereo_.match(tracks_.patches(track).newest, track.px, track.normalised, track.inverse_depth,
-                                          images_.left(), images_.right());
+                                          images_.left(), images_.right(), searches_line(track));
   if (match.failure != StereoFailure::none) return false;
   track.right = observe(rig_.right(), match.px, match.normalised, options_.sigma_px);
   track.inverse_depth = match.inverse_depth;

@@ -78,7 +78,8 @@ std::optional<Vec2> KltStereoMatcher::project(const Vec2& left_normalised, doubl
   return camera_right_.project(ray);
 }
 
-std::optional<Vec2> KltStereoMatcher::search(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const {
+std::optional<Vec2> KltStereoMatcher::best_along_line(const KltTemplate& patch, const Vec2& left_normalised,
+                                                      const Pyramid& right) const {
   const int l = std::min(kSearchLevel, right.levels() - 1);
   const KltLevelTemplate& level_patch = patch.levels[static_cast<std::size_t>(l)];
   const auto far = project(left_normalised, 0), near = project(left_normalised, 1 / min_depth_m_);
@@ -135,27 +136,28 @@ StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_
 }
 
 StereoMatch KltStereoMatcher::match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
-                                    std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right) {
-  if (turned_) return match_turned(left_px, left_normalised, inverse_depth, left, right);
+                                    std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right, bool search) {
+  if (turned_) return match_turned(left_px, left_normalised, inverse_depth, left, right, search);
   StereoMatch match;
   if (inverse_depth) {
     if (const auto start = project(left_normalised, *inverse_depth))
       match = refine(patch, left_px, left_normalised, *start, effort_.known_depth_level, left, right);
     if (match.failure == StereoFailure::none) return match;
   }
+  if (!search) return match;
   whole_.cut(left, left_px, 0, kSearchLevel);
-  if (const auto start = search(whole_, left_normalised, right))
+  if (const auto start = best_along_line(whole_, left_normalised, right))
     match = refine(whole_, left_px, left_normalised, *start, kSearchLevel, left, right);
   return match;
 }
 
 StereoMatch KltStereoMatcher::match_turned(const Vec2& left_px, const Vec2& left_normalised, std::optional<double> inverse_depth,
-                                           const Pyramid& left, const Pyramid& right) {
+                                           const Pyramid& left, const Pyramid& right, bool search) {
   StereoMatch match;
   PatchReference patch;
   if (!patch.take(left, left_px, camera_left_, left_normalised)) return match;
   if (inverse_depth) match = refine_turned(patch, left_px, left_normalised, *inverse_depth, left, right);
-  if (match.failure == StereoFailure::none) return match;
+  if (match.failure == StereoFailure::none || !search) return match;
   if (const auto found = search_turned(patch, left_normalised, right))
     match = refine_turned(patch, left_px, left_normalised, *found, left, right);
   return match;

@@ -13,6 +13,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/features/patch_refine.hpp"
 #include "fbvins/features/pyramid.hpp"
+#include "fbvins/frontend/track_table.hpp"
 
 namespace fbvins {
 
@@ -39,6 +40,12 @@ struct KltStereoEffort {
   double sure_correlation = 2;  ///< a match that correlates by more is not followed back into the left image; 2: all are
 };
 
+/// Whether a track is searched for along its line in this image: a new one, or every fourth time. What the right image does not
+/// show, the next one mostly does not, either.
+inline bool searches_line(const TrackState& track) {
+  return track.age_frames < 2 || (static_cast<std::int64_t>(track.id.value) + track.age_frames) % 4 == 0;
+}
+
 class KltStereoMatcher {
  public:
   /// `min_depth_m`: smallest depth that is searched for in the right image.
@@ -46,17 +53,18 @@ class KltStereoMatcher {
 
   /// Between the images that are matched next.
   void place(const Pose<C1, C0>& T_C1C0);
-  /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure is the check that failed, if any.
+  /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure is the check that failed, if any. `search`:
+  /// along the whole line, where the depth is not known or not the right one.
   StereoMatch match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
-                    std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right);
+                    std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right, bool search = true);
 
  private:
   std::optional<Vec2> project(const Vec2& left_normalised, double inverse_depth) const;
-  std::optional<Vec2> search(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const;
+  std::optional<Vec2> best_along_line(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const;
   StereoMatch refine(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised, const Vec2& start_px,
                      int coarsest, const Pyramid& left, const Pyramid& right);
   StereoMatch match_turned(const Vec2& left_px, const Vec2& left_normalised, std::optional<double> inverse_depth,
-                           const Pyramid& left, const Pyramid& right);
+                           const Pyramid& left, const Pyramid& right, bool search);
   std::optional<double> search_turned(const PatchReference& reference, const Vec2& left_normalised, const Pyramid& right);
   StereoMatch refine_turned(const PatchReference& reference, const Vec2& left_px, const Vec2& left_normalised,
                             double inverse_depth, const Pyramid& left, const Pyramid& right);

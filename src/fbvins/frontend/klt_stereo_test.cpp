@@ -28,7 +28,7 @@ struct TurnedPair {
   }
 
   /// Share of a grid of features that is matched, each at the wall's depth.
-  double share_matched(const StereoRig& believed, std::optional<double> inverse_depth) const {
+  double share_matched(const StereoRig& believed, std::optional<double> inverse_depth, bool search = true) const {
     KltStereoMatcher matcher(believed, 0.35);
     int tried = 0, matched = 0;
     for (int y = 50; y <= 130; y += 16)
@@ -37,7 +37,7 @@ struct TurnedPair {
         KltTemplate patch;
         if (!patch.cut(left, px, 0, kLevels - 1)) continue;
         ++tried;
-        const StereoMatch match = matcher.match(patch, px, *rig.left().undistort(px), inverse_depth, left, right);
+        const StereoMatch match = matcher.match(patch, px, *rig.left().undistort(px), inverse_depth, left, right, search);
         if (match.failure != StereoFailure::none) continue;
         ++matched;
         EXPECT_NEAR(match.inverse_depth, 1 / TestWall::kDepth_m, 0.02) << px.transpose();
@@ -58,6 +58,23 @@ TEST(KltStereo, MatchesImagesThatAreTurned) {
     EXPECT_GT(pair.share_matched(pair.rig, std::nullopt), 0.9) << angle;
     EXPECT_GT(pair.share_matched(pair.rig, 0.3), 0.9) << "from a depth, " << angle;
   }
+}
+
+TEST(KltStereo, WithoutSearchOnlyTheGivenDepthIsTried) {
+  for (const double angle : {0.0, std::numbers::pi}) {
+    const TurnedPair pair(angle);
+    EXPECT_EQ(pair.share_matched(pair.rig, std::nullopt, false), 0) << angle;
+    EXPECT_GT(pair.share_matched(pair.rig, 1 / TestWall::kDepth_m, false), 0.9) << angle;
+  }
+}
+
+TEST(KltStereo, NewTracksAreSearchedForAndOthersInOneImageOfFour) {
+  TrackState track;
+  int searched = 0;
+  for (track.age_frames = 2; track.age_frames < 42; ++track.age_frames) searched += searches_line(track);
+  EXPECT_EQ(searched, 10);
+  track.age_frames = 0;
+  EXPECT_TRUE(searches_line(track));
 }
 
 TEST(KltStereo, NothingMatchesWhereTheTurnIsNotKnown) {

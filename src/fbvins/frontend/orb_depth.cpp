@@ -35,8 +35,8 @@ bool OrbDepth::take_measured(OrbTrack& track, const FrameImages& images) {
 }
 
 bool OrbDepth::match(OrbTrack& track, const OrbPatches& patches, const FrameImages& images) {
-  const StereoMatch match =
-      by_alignment_.match(patches.newest, track.px, track.normalised, track.inverse_depth, images.left(), images.right());
+  const StereoMatch match = by_alignment_.match(patches.newest, track.px, track.normalised, track.inverse_depth, images.left(),
+                                                images.right(), searches_line(track));
   if (match.failure != StereoFailure::none) return false;
   const auto normalised = right_camera_.undistort(match.px);
   if (!normalised) return false;

@@ -2,6 +2,7 @@
 #include "fbvins/frontend/orb_frontend.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/frontend/observe.hpp"
@@ -12,6 +13,8 @@ namespace {
 /// Bounds of the gap without images after which tracks end. It is as long as tracks are remembered (memory_s), and no longer
 /// than the predictor's IMU readings span.
 constexpr double kShortestGap_s = 0.3, kLongestGap_s = 1.4;
+/// With fewer tracks than this share of those wanted new ones are started at once.
+constexpr double kShareThatWaits = 0.5;
 
 int count_observed(const OrbTracks& tracks) {
   return static_cast<int>(std::count_if(tracks.begin(), tracks.end(), [](const OrbTrack& t) { return t.observed; }));
@@ -24,6 +27,7 @@ OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features
 OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::shared_ptr<DescriptorStage> stage)
     : options_(options),
       most_(options.max_features),
+      spreads_work_(rig.has_right() && stage->changes_descriptors()),
       camera_(rig.left()),
       T_C1C0_(rig.T_C1C0()),
       images_(rig, kOrbAlignmentLevels),
@@ -51,6 +55,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   if (images_.forget_before_gap(longest_gap_s())) {
     tracks_.end_all(TrackStatus::out_of_view);
     drop_ended();
+    unfinished_ = false;
   }
   out.cameras = {!images_.left().empty(), images_.has_depth()};
   stats.pyramid_ms = timer.lap_ms();
@@ -58,6 +63,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   // Without a left image tracks stay as they are; the motion to the next image spans the gap.
   if (!out.has(0)) return out;
 
+  if (std::exchange(unfinished_, false)) finish_before(stats);
   view_.t = images_.t();
   view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
@@ -71,7 +77,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   }
   cut_patches(tracks_, images_.left(), camera_);
   drop_ended();
-  if (detected) starter_.start(tracks_, view_, images_.left(), stats);
+  if (detected && !unfinished_) starter_.start(tracks_, view_, images_.left(), stats);
   else stats.tracked = count_observed(tracks_);
   detection_.pass(detected, stats.tracked + stats.detected);
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
@@ -95,12 +101,14 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   predict(tracks_, camera_, motion, depth_.typical_inverse_depth());
   drop_ended();
   locator_.follow(tracks_, view_, images_, stats);
-  const bool detected = detection_.due(count_observed(tracks_));
+  const int followed = count_observed(tracks_);
+  const bool detected = detection_.due(followed);
   if (detected) {
+    unfinished_ = spreads_work_ && followed > kShareThatWaits * most_;
     detect(left, stats);
     const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, improver_, stats);
     locator_.locate(tracks_, view_, images_, found, stats);
-    recogniser_.recognise(tracks_, view_, images_.left(), improver_, stats);
+    if (!unfinished_) recogniser_.recognise(tracks_, view_, images_.left(), improver_, stats);
   }
   CpuTimer timer;
   outliers_.judge(tracks_, view_, predictor_, stats);
@@ -111,6 +119,19 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   drop_ended();
   stats.geometry_ms = timer.lap_ms();
   return detected;
+}
+
+/// What can wait until the next image has come, of the image before, whose keypoints the view still holds: known landmarks are
+/// looked for and tracks are started. They are followed into the next image like all others.
+void OrbFrontend::finish_before(FrontendStats& stats) {
+  --view_.index;
+  const std::size_t others = tracks_.size();
+  recogniser_.recognise(tracks_, view_, images_.before(), improver_, stats);
+  cut_patches(tracks_, images_.before(), camera_, others);
+  drop_ended();
+  starter_.start(tracks_, view_, images_.before(), stats);
+  detection_.add(stats.detected);
+  ++view_.index;
 }
 
 /// Extracts and describes keypoints of the left image (2.2.1, 2.2.2).
@@ -166,6 +187,7 @@ void OrbFrontend::take_over(TrackTransfer handover) {
   tracks_.end_all(TrackStatus::out_of_view);
   drop_ended();
   tracks_.begin_ids_at(handover.next_id);
+  unfinished_ = false;
   view_.t = handover.t;
   view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);

@@ -50,11 +50,14 @@ class OrbFrontend final : public LeadingFrontend {
   double longest_gap_s() const;
   bool follow(const ImageView& left, FrontendStats& stats);
   void detect(const ImageView& left, FrontendStats& stats);
+  void finish_before(FrontendStats& stats);
   void drop_ended();
   bool resume(const TransferredTrack& handed, const Pyramid& image);
 
   OrbFrontendOptions options_;
-  int most_;  ///< features
+  int most_;                 ///< features
+  bool spreads_work_;        ///< of improved descriptors, over the image of the keypoints and the next one
+  bool unfinished_ = false;  ///< the image before
   Camera camera_;
   Pose<C1, C0> T_C1C0_;
   FrameImages images_;

@@ -15,8 +15,9 @@ namespace orb_frontend_test {
 using namespace textured_wall;
 
 std::vector<TrackedFrame> run(const std::vector<SensorPacket>& input, const OrbFrontendOptions& options = small_options(),
-                              const StereoRig& rig = world().rig) {
-  OrbFrontend frontend(rig, options);
+                              const StereoRig& rig = world().rig,
+                              const std::shared_ptr<DescriptorStage>& stage = make_identity_stage()) {
+  OrbFrontend frontend(rig, options, stage);
   std::vector<TrackedFrame> out;
   for (const SensorPacket& p : input) out.push_back(frontend.process(p, StatePrior{}));
   return out;
@@ -101,6 +102,22 @@ TEST(OrbFrontend, DetectsInOneImageInFour) {
   EXPECT_LE(detected, (static_cast<int>(frames.size()) - 1) / 2);
   EXPECT_GT(frames.back().features.size(), 25u);
   EXPECT_LT(median_error_px(frames), 0.12);
+}
+
+TEST(OrbFrontend, WithImprovedDescriptorsTracksAreStartedInTheImageAfterTheirKeypoints) {
+  struct Improver final : DescriptorStage {
+    void improve(int, int, OrbFeatures&) override {}
+    bool changes_descriptors() const override { return true; }
+  };
+  const auto frames = run(packets(), small_options(), world().rig, std::make_shared<Improver>());
+  EXPECT_LT(median_error_px(frames), 0.12);
+  int started = 0;
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    if (frames[k].stats.detected == 0) continue;
+    EXPECT_GT(frames[k - 1].stats.detect_ms, 0) << k;
+    started += frames[k].stats.detected;
+  }
+  EXPECT_GT(started, 0);
 }
 
 TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {

@@ -39,6 +39,7 @@ class OrbImprover {
   double take_ms() { return std::exchange(ms_, 0.0); }
 
  private:
+  void take_most_similar(OrbView& view);
   void run(const OrbView& view);
 
   std::shared_ptr<DescriptorStage> stage_;
@@ -46,6 +47,7 @@ class OrbImprover {
   std::vector<Descriptor> descriptors_;
   std::vector<std::int32_t> near_, keypoints_;
   std::vector<std::uint16_t> distance_;
+  std::vector<std::pair<std::uint16_t, std::int32_t>> similar_;  ///< distance to a query, and keypoint
   double ms_ = 0;
 };
 

@@ -72,8 +72,9 @@ bool OrbStarter::start_track(std::size_t k, double max_uncertainty_px, OrbTracks
   const auto normalised = camera_.undistort(keypoint.pixel);
   if (!normalised || tracks.full() || !camera_.inside(keypoint.pixel, kPatchBorder_px)) return false;
   OrbPatches& patches = tracks.free_patches();
-  if (!patches.newest.cut(left, keypoint.pixel, 0, kOrbAlignmentLevels - 1)) return false;
+  if (!patches.newest.cut(left, keypoint.pixel, 0, 0)) return false;
   if (weakest_direction_px(patches.newest.levels[0]) > max_uncertainty_px) return false;
+  patches.newest.extend(left, keypoint.pixel, kOrbAlignmentLevels - 1);
   if (!patches.reference.take(left, keypoint.pixel, camera_, *normalised)) return false;
   OrbTrack track;
   take_descriptor(track, patches, view, k);

@@ -94,8 +94,9 @@ void forget(OrbTracks& tracks, Time now, double memory_s) {
   }
 }
 
-void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera) {
-  for (OrbTrack& track : tracks) {
+void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera, std::size_t begin) {
+  for (std::size_t i = begin; i < tracks.size(); ++i) {
+    OrbTrack& track = tracks[i];
     if (!track.observed) continue;
     OrbPatches& patches = tracks.patches(track);
     const int first = std::exchange(track.newest_levels, 0);

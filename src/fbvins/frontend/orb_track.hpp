@@ -74,7 +74,7 @@ bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const O
 void thin_out(OrbTracks& tracks, int most, double min_distance_px);
 /// Ends tracks that were not observed for too long, and the youngest of too many.
 void forget(OrbTracks& tracks, Time now, double memory_s);
-/// Cuts the newest patches of observed tracks; a track at the border is lost.
-void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera);
+/// Cuts the newest patches of observed tracks, from the one at index `begin` on; a track at the border is lost.
+void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera, std::size_t begin = 0);
 
 }  // namespace fbvins

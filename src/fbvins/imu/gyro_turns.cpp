@@ -2,7 +2,6 @@
 #include "fbvins/imu/gyro_turns.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 namespace fbvins {
 namespace {
@@ -46,18 +45,30 @@ bool GyroTurns::covers(Time a, Time b) const {
 
 /// Between two readings by their mean: at a degree apart it differs from the great circle by less than 1e-6 rad.
 Quat GyroTurns::orientation(Time t) const {
-  const auto after = std::lower_bound(turned_.begin(), turned_.end(), t, [](const Rotation& r, Time at) { return r.t < at; });
-  if (after == turned_.begin()) return after->q;
-  if (after == turned_.end()) return turned_.back().q;
-  const auto before = std::prev(after);
-  const double x = (t - before->t).seconds() / (after->t - before->t).seconds();
-  return Quat((1 - x) * before->q.coeffs() + x * after->q.coeffs()).normalized();
+  if (t <= first()) return turned_.front().q;
+  if (t > last()) return turned_.back().q;
+  const std::size_t k = not_before(t);
+  const Rotation &before = turned_[k - 1], &after = turned_[k];
+  const double x = (t - before.t).seconds() / (after.t - before.t).seconds();
+  return Quat((1 - x) * before.q.coeffs() + x * after.q.coeffs()).normalized();
+}
+
+/// The first reading that is not before t, which lies between the first and the last. Readings are nearly evenly spaced, so it is
+/// not far from where it would be if they were.
+std::size_t GyroTurns::not_before(Time t) const {
+  const double share = (t - first()).seconds() / (last() - first()).seconds();
+  std::size_t k = std::min(static_cast<std::size_t>(share * static_cast<double>(turned_.size() - 1)), turned_.size() - 1);
+  while (turned_[k].t < t) ++k;
+  while (k > 0 && !(turned_[k - 1].t < t)) --k;
+  return k;
 }
 
 TurnAround GyroTurns::around(Time t, Duration side) const {
   side = std::clamp(side, kLeastSide, kMostSide);
   const double s = side.seconds();
-  const Vec3 before = so3_log(between(t - side, t)), after = so3_log(between(t, t + side));
+  const Quat here = orientation(t);
+  const Vec3 before = so3_log((orientation(t - side).conjugate() * here).normalized());
+  const Vec3 after = so3_log((here.conjugate() * orientation(t + side)).normalized());
   return {(before + after) / (2 * s), (after - before) / (s * s)};
 }
 

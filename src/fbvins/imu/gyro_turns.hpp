@@ -51,6 +51,7 @@ class GyroTurns {
   };
   void add_reading(Time t, const Vec3& rate);
   Quat orientation(Time t) const;
+  std::size_t not_before(Time t) const;
   struct Gap {
     Time from, to;
   };

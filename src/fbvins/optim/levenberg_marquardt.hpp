@@ -34,6 +34,8 @@ struct LmOptions {
   /// differs from the predicted one by less than this: the quadratic model is accurate there, and so is its minimum.
   double min_decrease = 0.05;
   int max_followed = 3;  ///< steps with the information of one linearisation, beside its own, of a problem that KeepsInformation
+  /// Where such steps no longer help, another linearisation is worth its time if the last one was longer than this.
+  double worth_linearising = 0;
 };
 
 struct LmSummary {
@@ -69,12 +71,12 @@ bool follow(Problem& problem, const LmOptions& options, LmSummary& summary) {
     if (!(decrease > 0.5 * predicted)) {
       problem.undo_step();
       ++summary.rejected;
-      return false;
+      break;
     }
     summary.final_cost -= decrease;
     if (std::abs(predicted - decrease) < options.min_decrease) return true;
   }
-  return false;
+  return problem.step_size() < options.worth_linearising;
 }
 
 template <class Problem>

@@ -84,6 +84,19 @@ TEST(LevenbergMarquardt, StepsWithKeptInformationEndAtTheSameMinimum) {
   EXPECT_GT(summary.followed, 0);
 }
 
+TEST(LevenbergMarquardt, LinearisesAgainOnlyAfterLongSteps) {
+  LmOptions options{.max_iterations = 100, .initial_lambda = 1e-9, .min_step = 1e-12, .min_decrease = 0};
+  Keeping all;
+  all.x = {0.9, 0.85};
+  EXPECT_GT(minimise(all, options).iterations, 1);
+  options.worth_linearising = 1;
+  Keeping one;
+  one.x = {0.9, 0.85};
+  const LmSummary summary = minimise(one, options);
+  EXPECT_EQ(summary.iterations, 1);
+  EXPECT_LT(summary.final_cost, summary.initial_cost);
+}
+
 TEST(LevenbergMarquardt, ANegligibleStepIsMadeWithoutEvaluatingIt) {
   struct Counting : Keeping {
     int evaluated = 0;
