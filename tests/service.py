@@ -139,9 +139,10 @@ class Service(unittest.TestCase):
         _, err = program.communicate(timeout=120)
         self.assertEqual(program.returncode, 0, err)
         live = json.loads((folder / "run" / "summary.json").read_text(encoding="utf-8"))["live"]
-        # Waiting for a map's file would cost twelve seconds of the recording, 240 images; for the record or the results as many.
+        # Waiting for a map's file would cost twelve seconds of the recording, 240 images; for the record or the results as many. A
+        # busy machine may cost half of that.
         self.assertLess(live["images_dropped"], 120)
-        self.assertLess(live["shutter_to_pose_ms"]["max"], 3000)
+        self.assertLess(live["shutter_to_pose_ms"]["max"], 6000)
         self.assertGreater(sum(self.sessions_of(folder / "flat.fbm").values()), 5)
 
     def test_what_stands_in_the_way_of_an_output_does_not_stop_the_poses(self):

@@ -163,7 +163,7 @@ TEST(Ingest, CamerasMayDeliverAlone) {
   Ingest one(
       1, [&] { return now; }, {}, {}, {}, 1),
       three(
-          LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 3);
+          1, [&] { return now; }, {}, {}, {}, 3);
   begin(one, now), begin(three, now);
   for (std::int64_t t = 0; t < 60; t += 6) {  // closer together than an image that comes twice
     now = ms(1000 + t);
