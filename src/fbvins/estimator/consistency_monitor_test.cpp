@@ -46,7 +46,8 @@ class Scene {
     std::vector<LandmarkObservation> out = seen({});
     calibration.cameras = {rig.T_BC(0), rig.T_BC(1), rig.T_BC(0), rig.T_BC(1)};
     for (std::size_t i = 0; i < points_.size(); i += 2) {
-      features_[i] = {.lead = 2};
+      features_[i] = {};
+      features_[i].lead = 2;
       features_[i].see(2, observe(rig.T_BC(0).inverse() * (camera_2.inverse() * points_[i])));
       features_[i].see(3, observe(rig.T_BC(1).inverse() * (camera_3.inverse() * points_[i])));
     }

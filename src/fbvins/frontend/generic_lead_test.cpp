@@ -22,7 +22,7 @@ StereoRig pair() {
 
 /// Follows one feature in the left image under number 0, and gives each image one more that is new.
 struct Counting final : Frontend {
-  explicit Counting(const StereoRig& rig, std::vector<LandmarkUpdate>* told = nullptr) : camera(rig.left()), told(told) {}
+  explicit Counting(const StereoRig& rig, std::vector<LandmarkUpdate>* updates = nullptr) : camera(rig.left()), told(updates) {}
   TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
     TrackedFrame out;
     if (!packet.frame.left()) return out;

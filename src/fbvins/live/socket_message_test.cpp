@@ -277,7 +277,7 @@ TEST(SocketMessage, MessagesOfVersionOneOneAreShorter) {
   EXPECT_EQ(std::get<SocketHello>(*parsed).layout.cameras, 2);
   hello.flags |= FBVINS_SOCKET_HAS_CAMERAS;
   EXPECT_EQ(refusal(bytes_of(hello, 472)), "hello of 472 bytes where 1512 are needed");
-  FbvinsSocketFrame frame{{FBVINS_SOCKET_FRAME, 32}, 42, 7, 3, FBVINS_SOCKET_LEFT};
+  FbvinsSocketFrame frame{{FBVINS_SOCKET_FRAME, 32}, 42, 7, 3, FBVINS_SOCKET_LEFT, {}};
   EXPECT_EQ(refusal(bytes_of(frame, 32)), "taken");
 }
 

@@ -9,7 +9,8 @@ namespace tracking_test {
 Observation at(double x_px) { return {.pixel = Vec2(x_px, 0)}; }
 
 TEST(TrackedFeature, IsSeenByAnyCamerasItsLeadFirst) {
-  TrackedFeature f{.lead = 2};
+  TrackedFeature f;
+  f.lead = 2;
   for (const int camera : {1, 0, 2, 5}) f.see(camera, at(10 * camera));
   ASSERT_EQ(f.seen.size(), 4u);
   EXPECT_EQ(f.seen.front().camera, 2);
