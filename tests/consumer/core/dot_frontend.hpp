@@ -20,7 +20,10 @@ class DotFrontend final : public fbvins::Frontend {
     for (int dot = 0; dot < wall::kDots; ++dot) {
       const auto k = static_cast<std::size_t>(dot);
       if (!left[k]) continue;
-      out.features.push_back({fbvins::TrackId{dot}, *left[k], right[k], packet.id.value > 0});
+      fbvins::TrackedFeature feature{fbvins::TrackId{dot}, packet.id.value > 0};
+      feature.see(0, left[k]);
+      feature.see(1, right[k]);
+      out.features.push_back(feature);
       out.stats.stereo += right[k].has_value();
     }
     return out;
