@@ -28,8 +28,8 @@ struct TurnedPair {
   }
 
   /// Share of a grid of features that is matched, each at the wall's depth.
-  double share_matched(const StereoRig& believed, std::optional<double> inverse_depth, bool search = true) const {
-    KltStereoMatcher matcher(believed, 0.35);
+  double share_matched(const StereoRig& assumed, std::optional<double> inverse_depth, bool search = true) const {
+    KltStereoMatcher matcher(assumed, 0.35);
     int tried = 0, matched = 0;
     for (int y = 50; y <= 130; y += 16)
       for (int x = 80; x <= 160; x += 16) {
