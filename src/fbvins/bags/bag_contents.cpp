@@ -118,9 +118,9 @@ std::vector<ImuSample> ordered(ImuTopic& topic, RowCounts& counts) {
   return in_order(std::move(topic.samples), counts);
 }
 
-/// Where the topic's name says that its images are rectified, and that makes a difference.
-const BagCamera::Rectified* rectified_of(const BagCamera& camera, const std::string& topic) {
-  return camera.rectified && names_rectified(topic) ? &*camera.rectified : nullptr;
+/// Where its images are rectified.
+const BagCamera::Rectified* rectified_of(const BagContents& contents, const BagCamera& camera, const std::string& topic) {
+  return camera.rectified && contents.rectified.value_or(names_rectified(topic)) ? &*camera.rectified : nullptr;
 }
 
 }  // namespace
@@ -142,19 +142,23 @@ std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transf
   return end == found.end() ? std::nullopt : std::optional(end->second);
 }
 
-std::string rectified_topics(const BagContents& contents, const ChosenTopics& topics) {
-  std::vector<std::string> said;
+std::vector<std::string> rectifiable_topics(const BagContents& contents, const ChosenTopics& topics) {
+  std::vector<std::string> out;
   for (const std::string& topic : topics.cameras) {
     const BagCamera* camera = camera_for(contents, topic);
-    const auto* rectified = camera ? rectified_of(*camera, topic) : nullptr;
+    const BagCamera::Rectified* rectified = camera && camera->rectified ? &*camera->rectified : nullptr;
     if (rectified &&
         (rectified->R_rectified_raw != Mat3::Identity() || camera->camera.intrinsics() != rectified->camera.intrinsics() ||
          camera->camera.distortion() != rectified->camera.distortion()))
-      said.push_back(printable(topic));
+      out.push_back(topic);
   }
-  if (said.empty()) return "";
-  return fmt::format("the images on {} are taken as rectified by their name: R and P of camera_info are used, not K and D",
-                     fmt::join(said, ", "));
+  return out;
+}
+
+std::vector<std::string> rectified_topics(const BagContents& contents, const ChosenTopics& topics) {
+  std::vector<std::string> out = rectifiable_topics(contents, topics);
+  std::erase_if(out, [&](const std::string& topic) { return !rectified_of(contents, *camera_for(contents, topic), topic); });
+  return out;
 }
 
 std::vector<ImuSample> readings_on(BagContents& contents, const std::string& imu, const std::string& accel, RowCounts& counts) {
@@ -268,7 +272,7 @@ Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics
     const auto T_BC = find_transform(contents.transforms, body, camera->frame);
     if (!T_BC) return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
     MountedCamera mounted{camera->camera, T_BC->cast_frames<B, C0>()};
-    if (const auto* rectified = rectified_of(*camera, topic)) {
+    if (const auto* rectified = rectified_of(contents, *camera, topic)) {
       // Messages of the second one may name the first one's frame, in whose rectified axes it lies at x.
       const bool in_first = !cameras.empty() && camera->frame == first.frame && first.rectified;
       const Mat3& R = in_first ? first.rectified->R_rectified_raw : rectified->R_rectified_raw;

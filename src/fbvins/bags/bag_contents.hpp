@@ -46,6 +46,7 @@ struct BagContents {
   std::vector<BagTransform> transforms;       ///< the static ones
   std::vector<TrajectoryPoint> ground_truth;  ///< of the topic /ground_truth
   std::set<std::string> strangers;            ///< topics that are no messages of ROS (BagReader::strangers)
+  std::optional<bool> rectified;              ///< whether its images are; unset: those whose topic's name says so
   std::string rig;                            ///< of a bag that `fbvins convert` wrote: all of its calibration (rig_text.hpp)
 };
 
@@ -87,11 +88,12 @@ std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const Chos
 /// Takes camera_info files, a camera each in the order of the topics, instead of the bag's messages. Where the bag does not know
 /// the place of the second camera, it is that of the files' R and P.
 Result<void> take_camera_info(const std::string& paths, const ChosenTopics& topics, BagContents& contents);
-/// From camera_info and transforms: K and D of raw images, R and P of topics that are called rectified. The error says what is
-/// missing. `given`: the camera_info files of take_camera_info(), if there are any.
+/// From camera_info and transforms: K and D of raw images, R and P of rectified ones. The error says what is missing. `given`:
+/// the camera_info files of take_camera_info(), if there are any.
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics, const std::string& given = "");
-/// A sentence about the topics that are taken as rectified where that makes a difference; empty without.
-std::string rectified_topics(const BagContents& contents, const ChosenTopics& topics);
+/// The topics whose rectified images camera_info tells from raw ones, and of these the ones whose images are taken as rectified.
+std::vector<std::string> rectifiable_topics(const BagContents& contents, const ChosenTopics& topics);
+std::vector<std::string> rectified_topics(const BagContents& contents, const ChosenTopics& topics);
 /// Without those from number 2 on, which nobody has calibrated: colour cameras.
 std::vector<std::string> calibrated_cameras(const BagContents& contents, const ChosenTopics& topics);
 /// Why the depth images do not lie on those of the first camera, pixel by pixel, as far as the bag tells; empty: they do.

@@ -15,6 +15,7 @@
 #include "fbvins/bags/bag_stamps.hpp"
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/bags/given_calibration.hpp"
+#include "fbvins/bags/rectified_images.hpp"
 #include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
@@ -67,6 +68,8 @@ class BagRecording {
         return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
     describe_bag(*bag);
     make_loader(std::move(bag));
+    if (of_camera_info_ && topics_.depth.empty() && !side_by_side_)
+      judge_rectified(contents_, topics_, options_.calibration, out_);
     return std::move(out_);
   }
 
@@ -120,7 +123,7 @@ class BagRecording {
       if (!rig) return rig.error();
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
-      if (std::string said = rectified_topics(contents_, topics_); !said.empty()) out_.info.warnings.push_back(std::move(said));
+      of_camera_info_ = true;
     }
     if (const std::string& imu = options_.dataset.kalibr_imu; !imu.empty()) {
       const Result<StereoRig> given = with_imu_file(*rig_, imu);
@@ -264,6 +267,7 @@ class BagRecording {
   bool side_by_side_ = false;       ///< the one topic of images has those of both cameras
   bool named_ = false;              ///< topics of images are given, and not found
   bool whole_calibration_ = false;  ///< the bag's own, noise and rates included
+  bool of_camera_info_ = false;     ///< the calibration
   DatasetContents out_;
 };
 

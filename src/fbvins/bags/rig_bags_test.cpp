@@ -260,9 +260,9 @@ TEST(RigTopics, RectifiedImagesAreThoseOfRAndP) {
   const ChosenTopics rectified{{"/left/image_rect", "/right/image_rect"}, "/imu", "", ""},
       raw{{"/left/image_raw", "/right/image_raw"}, "/imu", "", ""};
   EXPECT_EQ(rig_of(contents, raw)->left().intrinsics()[0], 90);
-  EXPECT_EQ(rectified_topics(contents, raw), "");
-  EXPECT_NE(rectified_topics(contents, rectified).find("/left/image_rect, /right/image_rect are taken as rectified"),
-            std::string::npos);
+  EXPECT_TRUE(rectified_topics(contents, raw).empty());
+  EXPECT_EQ(rectified_topics(contents, rectified), rectified.cameras);
+  EXPECT_EQ(rectifiable_topics(contents, raw), raw.cameras);
   auto rig = rig_of(contents, rectified);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->left().intrinsics()[0], 80);
