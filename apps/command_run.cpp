@@ -83,6 +83,11 @@ int run(const Arguments& arguments) {
   }();
   if (!flight) return fail(flight.error().message);
   warnings.print_at_end((*data)->info());
+  if (const int repeated = flight->images_repeated; repeated > 0)
+    warn(
+        fmt::format("{} images are the same as an earlier one of their camera, though the vehicle has turned: they are left out; "
+                    "look at the camera's driver, or at the program that recorded it",
+                    repeated));
 
   const RunSummary summary = summarise(*flight, **data, *config, arguments.flight);
   if (Result<void> written = write_flight(*flight, summary, *config, (*data)->ground_truth(), *folder); !written)

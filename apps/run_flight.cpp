@@ -80,6 +80,7 @@ Result<Flight> process(const FlightArguments& arguments, const Config& config, D
   if (looking) end_look();
   if (Result<void> done = system->finish(); !done) return done.error();
   flight.calibration = system->calibration();
+  flight.images_repeated = system->input_counts().images_repeated;
   return flight;
 }
 

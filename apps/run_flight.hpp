@@ -30,6 +30,7 @@ struct Flight {
   RunRecord run;
   std::optional<MapRecord> map;  ///< with loop closure
   Calibration calibration;       ///< as estimated in the end
+  int images_repeated = 0;       ///< and left out
   double wall_s = 0;
 };
 

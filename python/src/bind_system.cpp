@@ -241,6 +241,7 @@ nb::dict counts_of(const PySystem& system) {
   out["imu_overflow"] = counts.imu.overflow;
   out["images"] = counts.images;
   out["images_backward"] = counts.images_backward;
+  out["images_repeated"] = counts.images_repeated;
   return out;
 }
 

@@ -17,6 +17,7 @@ struct InputCounts {
   ImuCounts imu;
   int images = 0;
   int images_backward = 0;  ///< stamp not after the image before: skipped
+  int images_repeated = 0;  ///< of all cameras, the same as an earlier one though the vehicle has turned: left out
 };
 
 }  // namespace fbvins

@@ -127,9 +127,9 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.all().empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
-  const bool halved = frame.has(0) != frame.has(1) && !broken && !frames_.all().empty() &&
-                      (frame.t - frames_.all().back().t).seconds() < kLongestSkip_s;
-  if (halved && usable_features(frame, at_rest) < kMinFeaturesAtRest) {
+  const bool incomplete = !(frame.has(0) && frame.has(1)) && !broken && !frames_.all().empty() &&
+                          (frame.t - frames_.all().back().t).seconds() < kLongestSkip_s;
+  if (incomplete && usable_features(frame, at_rest) < kMinFeaturesAtRest) {
     skipped_ = joined(std::move(skipped_), frame.imu);
     readings_.push_back(frame.imu);
     return std::nullopt;

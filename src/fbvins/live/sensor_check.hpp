@@ -12,7 +12,7 @@
 #include <mutex>
 #include <vector>
 
-#include "fbvins/live/frozen_camera.hpp"
+#include "fbvins/pipeline/frozen_camera.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/source.hpp"
 

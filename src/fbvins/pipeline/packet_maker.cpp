@@ -57,25 +57,28 @@ void PacketMaker::correct_time_offset(Duration by) {
 }
 
 std::optional<SensorPacket> PacketMaker::next(bool flush) {
-  if (!is_ready(flush)) return std::nullopt;
-  const Time t = waiting_.front().t;
   SensorPacket packet;
+  Time t;
+  do {
+    if (!is_ready(flush)) return std::nullopt;
+    t = waiting_.front().t;
+    packet.frame = std::move(waiting_.front());
+    waiting_.pop_front();
+    if (previous_) packet.imu = imu_.between(*previous_, t);
+  } while (!repeated_.take_out(packet.frame, packet.imu));
+  packet.imu.time_offset = time_offset_;
   packet.id = FrameId{next_frame_++};
-  packet.frame = std::move(waiting_.front());
   packet.anchors = std::exchange(anchors_, {});
   std::erase_if(aiding_, [&](const AidingSample& reading) {
     if (stamp_of(reading) > t) return false;
     if (t - stamp_of(reading) < kOldestAiding) packet.aiding.push_back(reading);
     return true;
   });
-  waiting_.pop_front();
-  packet.imu.time_offset = time_offset_;
-  if (previous_) packet.imu = imu_.between(*previous_, t);
   imu_.forget_before(t - kMostCorrection);
   previous_ = t;
   return packet;
 }
 
-InputCounts PacketMaker::counts() const { return {imu_.counts(), static_cast<int>(next_frame_), backward_}; }
+InputCounts PacketMaker::counts() const { return {imu_.counts(), static_cast<int>(next_frame_), backward_, repeated_.count()}; }
 
 }  // namespace fbvins

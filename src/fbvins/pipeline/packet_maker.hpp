@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joins each stereo image with the IMU readings since the image before it. An image waits until the
-// readings reach its stamp, but for a limited time, so that a silent IMU does not block the images.
+// readings reach its stamp, but for a limited time, so that a silent IMU does not block the images. Images that repeat an earlier
+// one are left out.
 #pragma once
 
 #include <deque>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "fbvins/imu/imu_history.hpp"
+#include "fbvins/pipeline/repeated_images.hpp"
 #include "fbvins/types/input_counts.hpp"
 #include "fbvins/types/tracking.hpp"
 
@@ -37,6 +39,7 @@ class PacketMaker {
   bool is_ready(bool flush) const;
 
   ImuHistory imu_;
+  RepeatedImages repeated_;
   Duration given_, time_offset_;
   std::deque<StereoFrame> waiting_;
   std::vector<Anchor> anchors_;
