@@ -16,12 +16,8 @@ namespace fbvins {
 
 using AidingSample = std::variant<RangeSample, VelocitySample, PressureSample>;
 
-inline Time& stamp_of(AidingSample& reading) {
-  return std::visit([](auto& r) -> Time& { return r.t; }, reading);
-}
-inline Time stamp_of(const AidingSample& reading) {
-  return std::visit([](const auto& r) { return r.t; }, reading);
-}
+Time& stamp_of(AidingSample& reading);
+Time stamp_of(const AidingSample& reading);
 /// What makes a reading unusable, in words; empty: nothing.
 std::string impossible(const AidingSample& reading);
 

@@ -55,9 +55,7 @@ inline Pose<A, Tag> unknown_place() { return {Quat::Identity(), Vec3::Constant(s
 
 using Anchor = std::variant<PositionAnchor, HeightAnchor, TagAnchor>;
 
-inline Time stamp_of(const Anchor& anchor) {
-  return std::visit([](const auto& a) { return a.t; }, anchor);
-}
+Time stamp_of(const Anchor& anchor);
 
 /// What makes an anchor unusable, in words: a number that is not finite, a covariance that is none. Empty: nothing.
 std::string impossible(const Anchor& anchor);

@@ -46,29 +46,14 @@ struct ImuIntrinsics {
   Mat3 gyro = Mat3::Identity(), accel = Mat3::Identity();
   Mat3 gyro_by_force = Mat3::Zero();  ///< rad/s of a gyroscope for each m/s^2 ("g-sensitivity")
   ImuBias bias = {};
-  bool operator==(const ImuIntrinsics& o) const {
-    return gyro == o.gyro && accel == o.accel && gyro_by_force == o.gyro_by_force && bias.gyro_radps == o.bias.gyro_radps &&
-           bias.accel_mps2 == o.bias.accel_mps2;
-  }
+  bool operator==(const ImuIntrinsics& o) const;
 };
 
 /// What the reading means, by this calibration of its axes; the same bits where that says nothing.
-inline ImuSample corrected(const ImuSample& reading, const ImuIntrinsics& axes) {
-  if (axes == ImuIntrinsics{}) return reading;
-  const Vec3 force = axes.accel.inverse() * (reading.accel_mps2 - axes.bias.accel_mps2);
-  return {reading.t, axes.gyro.inverse() * (reading.gyro_radps - axes.bias.gyro_radps - axes.gyro_by_force * force), force};
-}
+ImuSample corrected(const ImuSample& reading, const ImuIntrinsics& axes);
 
 /// The axes of an IMU whose readings, corrected by `given`, still read by `found`.
-inline ImuIntrinsics followed_by(const ImuIntrinsics& given, const ImuIntrinsics& found) {
-  ImuIntrinsics out;
-  out.gyro = given.gyro * found.gyro;
-  out.accel = given.accel * found.accel;
-  out.gyro_by_force = given.gyro * found.gyro_by_force + given.gyro_by_force * found.accel;
-  out.bias.gyro_radps = given.gyro * found.bias.gyro_radps + given.gyro_by_force * found.bias.accel_mps2 + given.bias.gyro_radps;
-  out.bias.accel_mps2 = given.accel * found.bias.accel_mps2 + given.bias.accel_mps2;
-  return out;
-}
+ImuIntrinsics followed_by(const ImuIntrinsics& given, const ImuIntrinsics& found);
 
 /// An IMU as in calibration files: continuous-time noise, rate, range, and axes.
 struct ImuNoise {

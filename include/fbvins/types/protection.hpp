@@ -4,20 +4,12 @@
 //   if (protection_level_m(odometry.health, odometry.pose_covariance) > clearance_m) hold();
 #pragma once
 
-#include <Eigen/Eigenvalues>
-#include <cmath>
-#include <limits>
-
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
 
 /// Standard deviation of a position along its worst direction, m; `pose_covariance` is of (position [m], attitude [rad]).
-inline double worst_sigma_m(const Mat6& pose_covariance) {
-  const Mat3 position = pose_covariance.topLeftCorner<3, 3>();
-  if (!position.allFinite()) return std::numeric_limits<double>::quiet_NaN();
-  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Mat3>(position, Eigen::EigenvaluesOnly).eigenvalues()(2)));
-}
+double worst_sigma_m(const Mat6& pose_covariance);
 
 /// The probability that a pose's error is larger than its protection level.
 enum class IntegrityRisk { once_in_1e4, once_in_1e6 };
@@ -29,11 +21,6 @@ inline constexpr double kProtectionOnceIn1e4 = 10, kProtectionOnceIn1e6 = 40;
 /// exceeding it, if at most one sensor has failed. Measured where every flight has a fault: that of once in 10^4 is exceeded by
 /// one pose in 10,250 of simulated tracks, and with images by none of 97,887 good ones; that of once in 10^6 continues this tail
 /// (docs/experiments/integrity.md). Infinite where there is no pose, or no covariance.
-inline double protection_level_m(const Health& health, const Mat6& pose_covariance,
-                                 IntegrityRisk risk = IntegrityRisk::once_in_1e4) {
-  const double sigma_m = worst_sigma_m(pose_covariance);
-  if (!health.has_pose() || !std::isfinite(sigma_m)) return std::numeric_limits<double>::infinity();
-  return (risk == IntegrityRisk::once_in_1e4 ? kProtectionOnceIn1e4 : kProtectionOnceIn1e6) * sigma_m;
-}
+double protection_level_m(const Health& health, const Mat6& pose_covariance, IntegrityRisk risk = IntegrityRisk::once_in_1e4);
 
 }  // namespace fbvins

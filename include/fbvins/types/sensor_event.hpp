@@ -14,13 +14,7 @@ namespace fbvins {
 
 using SensorEvent = std::variant<ImuSample, StereoFrame, AidingSample>;
 
-inline Time& stamp_of(SensorEvent& event) {
-  return std::visit(
-      Overloaded{[](AidingSample& reading) -> Time& { return stamp_of(reading); }, [](auto& e) -> Time& { return e.t; }}, event);
-}
-inline Time stamp_of(const SensorEvent& event) {
-  return std::visit(Overloaded{[](const AidingSample& reading) { return stamp_of(reading); }, [](const auto& e) { return e.t; }},
-                    event);
-}
+Time& stamp_of(SensorEvent& event);
+Time stamp_of(const SensorEvent& event);
 
 }  // namespace fbvins

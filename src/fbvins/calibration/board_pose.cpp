@@ -8,6 +8,7 @@
 
 #include "fbvins/calibration/corner_noise.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -108,7 +109,7 @@ double refine(const LensModel& lens, const Board& board, const std::vector<Board
       Mat6 damped = H;
       damped.diagonal() *= 1 + lambda;
       damped.diagonal().array() += 1e-12;
-      const Vec6 step = damped.ldlt().solve(b);
+      const Vec6 step = Ldlt<6>(damped).solve(b);
       if (!step.allFinite()) return cost;
       const Pose<Cn, T> trial = pose.boxplus(step.head<3>(), step.tail<3>());
       const double next = cost_of(lens, board, corners, trial, spread_px, nullptr, nullptr);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/flight_points.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <map>
 #include <optional>
 
 #include "fbvins/camera/lens_projection.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -35,7 +35,7 @@ std::optional<Vec3> triangulated(const SeenPoint& point, const std::vector<Fligh
     H += across, b += across * T_WC.p;
   }
   H.diagonal().array() += 1e-9;
-  const Vec3 p_W = H.ldlt().solve(b);
+  const Vec3 p_W = Ldlt<3>(H).solve(b);
   double sum = 0;
   for (const SeenPoint::View& view : point.views) {
     const Vec3 p_C = pose_of(rig, view.camera, keyframes[static_cast<std::size_t>(view.keyframe)].state) * p_W;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/tag_finder.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 
 #include "fbvins/calibration/board_pose.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 #include "fbvins/calibration/tag_alignment.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -44,7 +44,7 @@ Mat6 covariance_of(const Camera& camera, const Board& board, const PosedBoard& p
     J << d.point, -d.point * R * hat(p_T);
     information += J.transpose() * J / (kCorner_px * kCorner_px);
   }
-  Mat6 covariance = information.inverse();
+  Mat6 covariance = inverted(information);
   // Which of the two poses it is may be open: as far as one is from the other, it is not known.
   if (2 * posed.other_costs_px2 < kPossible * kCorner_px * kCorner_px) widen(covariance, posed.T_CnT, posed.other);
   return 0.5 * (covariance + covariance.transpose());

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/camera/depth_reader.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -26,7 +27,7 @@ class Samples {
     g_ += s.rho * s.at;
   }
   /// The plane through them: value at the pixel and slopes; nullopt where they are too few.
-  std::optional<Vec3> plane() const { return count_ < kFewest ? std::nullopt : std::optional<Vec3>(H_.ldlt().solve(g_)); }
+  std::optional<Vec3> plane() const { return count_ < kFewest ? std::nullopt : std::optional<Vec3>(Ldlt<3>(H_).solve(g_)); }
   /// With the sensor's own `sigma`; nothing where one of them is off the plane.
   std::optional<MeasuredInverseDepth> on(const Vec3& plane, double sigma) const {
     double squares = 0;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fbvins/core/median.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/imu/nav_state.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -176,7 +177,7 @@ bool ForceProblem::settle(Window& window, double sigma) const {
   for (int iteration = 0; iteration < (window.settled ? 1 : kSettling); ++iteration) {
     const bool first = !window.settled;
     const Reduced at = linearise(window, sigma, first);
-    const Vec9 step = -at.H_motion.ldlt().solve(at.g_motion);
+    const Vec9 step = -Ldlt<9>(at.H_motion).solve(at.g_motion);
     if (!step.allFinite()) return false;
     for (std::size_t k = 0; k < window.tracks.size(); ++k)
       window.tracks[k].point -= at.H_point[k] * (at.g_point[k] + at.H_point_motion[k] * step);
@@ -240,7 +241,7 @@ void ForceProblem::follow(const VectorXd& step, double sigma) {
   for (Window& window : windows_) {
     if (!window.usable) continue;
     const Reduced at = linearise(window, sigma, false);
-    const Vec9 moved = -at.H_motion.ldlt().solve(at.g_motion + at.H_cross * step);
+    const Vec9 moved = -Ldlt<9>(at.H_motion).solve(Vec9(at.g_motion + at.H_cross * step));
     for (std::size_t k = 0; k < window.tracks.size(); ++k)
       window.tracks[k].point -= at.H_point[k] * (at.g_point[k] + at.H_point_motion[k] * moved + at.H_point_x[k] * step);
     window.motion += moved;

@@ -10,6 +10,7 @@
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/doctor/two_view.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -162,7 +163,7 @@ void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double s
       H += weight * J.transpose() * J;
       g += weight * J.transpose() * *r;
     }
-    const Vec3 step = -H.ldlt().solve(g);
+    const Vec3 step = -Ldlt<3>(H).solve(g);
     if (!step.allFinite()) return;
     pair.p_CaCb += step;
     if (pair.without_depths) pair.p_CaCb.normalize();

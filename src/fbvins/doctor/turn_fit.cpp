@@ -7,6 +7,7 @@
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/two_view.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
@@ -63,7 +64,7 @@ bool estimate_motion(const Camera& camera, FramePair& pair) {
     if (norms.size() < kFewestFeatures) return false;
     sigma = 0.85 * median(norms);  // of one coordinate, of a Rayleigh distribution
     H.diagonal().tail<3>().array() += 1e-4 * static_cast<double>(norms.size());
-    const Vec6 d = -H.ldlt().solve(g);
+    const Vec6 d = -Ldlt<6>(H).solve(g);
     if (!d.allFinite()) return false;
     q = (q * so3_exp(d.head<3>())).normalized();
     p += d.tail<3>();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fbvins/core/median.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
@@ -39,7 +40,7 @@ Quat turn_alone(const RayPairs& rays) {
       const double weight = huber(r.squaredNorm(), threshold).weight;
       H += weight * J.transpose() * J, g += weight * J.transpose() * r;
     }
-    const Vec3 d = -H.ldlt().solve(g);
+    const Vec3 d = -Ldlt<3>(H).solve(g);
     if (!d.allFinite()) return Quat::Identity();
     q = (so3_exp(d) * q).normalized();
     if (d.norm() < 1e-7) break;
@@ -107,7 +108,7 @@ bool estimate_without_depths(const Camera& camera, FramePair& pair) {
     sigma = std::max(kSigmaOfMedian * median(angles), kLeast_px / camera.focal_px());
     const Vec3 e = p.unitOrthogonal(), f = p.cross(e);
     step = linearise(rays, q, p, e, f, kSigmas * sigma);
-    const Eigen::Matrix<double, 5, 1> d = -step.H.ldlt().solve(step.g);
+    const Eigen::Matrix<double, 5, 1> d = -Ldlt<5>(step.H).solve(step.g);
     if (!d.allFinite()) return false;
     q = (so3_exp(Vec3(d.head<3>())) * q).normalized();
     p = (p + d(3) * e + d(4) * f).normalized();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/mono_start.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "fbvins/core/median.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/geometry/so3.hpp"
 #include "fbvins/imu/alignment.hpp"
 #include "fbvins/imu/preintegration.hpp"
@@ -19,6 +19,8 @@
 namespace fbvins {
 namespace {
 
+using Vec8 = Eigen::Matrix<double, 8, 1>;
+using Mat8 = Eigen::Matrix<double, 8, 8>;
 using Vec9 = Eigen::Matrix<double, 9, 1>;
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
@@ -150,7 +152,7 @@ Vec3 gyro_bias(const std::vector<FramePair>& pairs, const std::vector<Integrated
       H += U - gain * X.transpose();
       g += u - gain * w;
     }
-    const Vec3 step = -H.ldlt().solve(g);
+    const Vec3 step = -Ldlt<3>(H).solve(g);
     if (!step.allFinite()) break;
     change += step;
     if (step.norm() < 1e-5) break;
@@ -202,8 +204,8 @@ Linear linear_problem(const std::vector<Track>& tracks, const std::vector<Integr
       out.constant += r.constant.squaredNorm();
       out.rows += 2;
     }
-    const Eigen::LDLT<Mat3> ldlt(V);
-    if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-12)) continue;
+    const Ldlt<3> ldlt(V);
+    if (!ldlt.succeeded() || !(ldlt.least_pivot() > 1e-12)) continue;
     out.H -= X.transpose() * ldlt.solve(X);
     out.b += X.transpose() * ldlt.solve(w);
     out.constant -= w.dot(ldlt.solve(w));
@@ -222,8 +224,8 @@ struct Solved {
 std::optional<Solved> solve(const Linear& problem, double gravity_mps2, const Mat3& accel_information) {
   Mat9 H = problem.H;
   H.bottomRightCorner<3, 3>() += accel_information;
-  const Eigen::LDLT<Mat9> free(H);
-  if (free.info() != Eigen::Success) return std::nullopt;
+  const Ldlt<9> free(H);
+  if (!free.succeeded()) return std::nullopt;
   Vec3 direction = free.solve(problem.b).segment<3>(3);
   if (!(direction.norm() > 1e-3)) return std::nullopt;
   Solved out;
@@ -237,13 +239,13 @@ std::optional<Solved> solve(const Linear& problem, double gravity_mps2, const Ma
     S.block<3, 1>(3, 4) = gravity_mps2 * direction.cross(e);
     Vec9 base = Vec9::Zero();
     base.segment<3>(3) = gravity_mps2 * direction;
-    const Eigen::Matrix<double, 8, 8> A = S.transpose() * H * S;
-    const Eigen::LDLT<Eigen::Matrix<double, 8, 8>> ldlt(A);
-    if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 0)) return std::nullopt;
-    out.x = base + S * ldlt.solve(S.transpose() * (problem.b - H * base));
+    const Mat8 A = S.transpose() * H * S;
+    const Ldlt<8> ldlt(A);
+    if (!ldlt.succeeded() || !(ldlt.least_pivot() > 0)) return std::nullopt;
+    out.x = base + S * ldlt.solve(Vec8(S.transpose() * (problem.b - H * base)));
     direction = out.x.segment<3>(3);
     out.x.segment<3>(3) = gravity_mps2 * direction.normalized();
-    const Eigen::Matrix<double, 8, 8> covariance = ldlt.solve(Eigen::Matrix<double, 8, 8>::Identity());
+    const Mat8 covariance = ldlt.solve(Mat8(Mat8::Identity()));
     out.velocity_covariance = covariance.topLeftCorner<3, 3>();
   }
   out.cost = out.x.dot(problem.H * out.x) - 2 * problem.b.dot(out.x) + problem.constant;
@@ -269,7 +271,7 @@ double update_depths(const std::vector<Track>& tracks, const std::vector<Integra
       V += r.point.transpose() * r.point;
       w += r.point.transpose() * (r.x * x + r.constant);
     }
-    const Vec3 p = -V.ldlt().solve(w);
+    const Vec3 p = -Ldlt<3>(V).solve(w);
     bool good = p.allFinite();
     for (std::size_t i = 0; i < tracks[j].size() && good; ++i) {
       const Integrated& m = motion[tracks[j][i].frame];

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/pose_refinement.hpp"
 
-#include <Eigen/Cholesky>
-
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
@@ -55,8 +54,8 @@ PoseRefinement refine_pose(const std::vector<LandmarkObservation>& observations,
       n.inliers = with_first;
     }
     out.inliers = n.inliers;
-    const Eigen::LDLT<Mat6> ldlt(n.H);
-    if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-9)) return out;
+    const Ldlt<6> ldlt(n.H);
+    if (!ldlt.succeeded() || !(ldlt.least_pivot() > 1e-9)) return out;
     const Vec6 step = -ldlt.solve(n.g);
     out.T_GB = out.T_GB.boxplus(step.head<3>(), step.tail<3>());
     if (step.lpNorm<Eigen::Infinity>() < 1e-6) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/time_alignment.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/imu/stamp_noise.hpp"
 
 namespace fbvins {
@@ -111,7 +111,7 @@ double TimeAlignment::off_sigmas(const Vec3& gyro_bias_radps, const Mat3& covari
   if (!fits_turns_) return 0;
   const Vec3 off = gyro_bias_radps - fits_turns_->gyro_bias_radps();
   const Mat3 of_both = kBiasShared * kBiasShared * fits_turns_->covariance.topLeftCorner<3, 3>() + covariance;
-  return std::sqrt(std::max(0.0, off.dot(of_both.ldlt().solve(off))));
+  return std::sqrt(std::max(0.0, off.dot(Ldlt<3>(of_both).solve(off))));
 }
 
 double TimeAlignment::stamp_sigma_s() const {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "fbvins/geometry/five_point.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -78,7 +79,7 @@ bool refine_step(Model& model, const Matches& m, double threshold) {
   if (used < 5) return false;
   // Damping: directions that the matches do not determine (no parallax) stay where they are.
   H.diagonal().array() += 1e-6 * used;
-  const Vec5 d = -H.ldlt().solve(g);
+  const Vec5 d = -Ldlt<5>(H).solve(g);
   if (!d.allFinite()) return false;
   model.R = model.R * so3_exp(d.head<3>()).toRotationMatrix();
   model.t = (model.t + tangent * d.tail<2>()).normalized();

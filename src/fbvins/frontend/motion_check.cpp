@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/motion_check.hpp"
 
-#include <Eigen/Dense>
 #include <cmath>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
-
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 /// Standard deviations of the prediction between two images: of its rotation, and of its velocity.
 constexpr double kRotationSigma_rad = 1e-3, kVelocitySigma_mps = 0.02;
@@ -64,7 +62,7 @@ std::optional<CameraMotion> MotionCheck::corrected(const CameraMotion& predicted
       H += weight * J.transpose() * J;
       g += weight * J.transpose() * r;
     }
-    const Vec6 step = -H.ldlt().solve(g);
+    const Vec6 step = -Ldlt<6>(H).solve(g);
     const Mat3 turn = so3_exp(step.head<3>()).toRotationMatrix();
     motion.R_ba = turn * motion.R_ba;
     motion.p_ba = turn * motion.p_ba + step.tail<3>();

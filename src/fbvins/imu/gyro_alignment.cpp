@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/imu/gyro_alignment.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -217,9 +218,9 @@ GyroAlignmentEstimate GyroAlignment::solve_from(const Vec8& x, std::deque<Compar
     const Normal normal = linearise(out.x, compared);
     out.rms = std::sqrt(std::max(0.0, normal.cost) / std::max(1.0, normal.rows));
     const Mat8 H = normal.H + Mat8(prior.asDiagonal());
-    const Eigen::LDLT<Mat8> ldlt(H);
-    const Vec8 step = -(normal.compared > 0 ? kShare : 1) * ldlt.solve(normal.g + prior.cwiseProduct(out.x - known));
-    out.covariance = ldlt.solve(Mat8::Identity());
+    const Ldlt<8> ldlt(H);
+    const Vec8 step = -(normal.compared > 0 ? kShare : 1) * ldlt.solve(Vec8(normal.g + prior.cwiseProduct(out.x - known)));
+    out.covariance = ldlt.solve(Mat8(Mat8::Identity()));
     if (!step.allFinite()) break;
     out.x += step;
     out.x(3) = std::clamp(out.x(3), -kLargestOffset_s, kLargestOffset_s);

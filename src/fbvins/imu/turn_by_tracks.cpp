@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/imu/turn_by_tracks.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
@@ -79,7 +79,7 @@ Vec3 better_parallax(const std::vector<Sight>& sights, const Vec3& parallax) {
     V.noalias() -= w.information * w.along * w.shift * w.shift.transpose();
     v += w.information * (s.off - w.along * w.shift.dot(s.off) * w.shift);
   }
-  return -V.ldlt().solve(v);
+  return -Ldlt<3>(V).solve(v);
 }
 
 Vec3 fit_parallax(const std::vector<Sight>& sights, Vec3 parallax, int rounds) {
@@ -165,8 +165,9 @@ TurnError turn_error(const std::vector<SeenTwice>& tracks, const PredictedTurnOf
   }
   out.A.bottomLeftCorner<1, 3>() = out.A.topRightCorner<3, 1>().transpose();
   V.bottomLeftCorner<3, 3>() = V.topRightCorner<3, 3>().transpose();
-  const Eigen::LDLT<Mat6> ldlt(V);
-  out.A -= X * ldlt.solve(X.transpose());
+  const Ldlt<6> ldlt(V);
+  const Eigen::Matrix<double, 6, 4, Eigen::RowMajor> X_transposed = X.transpose();
+  out.A -= X * ldlt.solve(X_transposed);
   out.a -= X * ldlt.solve(v);
   out.cost -= v.dot(ldlt.solve(v));
   return out;

@@ -10,6 +10,8 @@
 #include <set>
 #include <utility>
 
+#include "fbvins/geometry/ldlt.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -309,12 +311,12 @@ double Adjustment::drift_found(const AdjustmentState& x) const {
   for (const auto& [a, b, edge] : steps_) {
     if (edge->kind != MapEdge::Kind::odometry) continue;
     if (end != a) begin = a, T = {}, covariance.setZero();
-    covariance = compose_covariance(T, covariance, edge->T_from_to, edge->information.inverse());
+    covariance = compose_covariance(T, covariance, edge->T_from_to, inverted(edge->information));
     T = T * edge->T_from_to;
     end = b;
     if ((keyframe(b).t - keyframe(*begin).t).seconds() < kStretch_s) continue;
     const Vec6 r = edge_residual(pose(x, *begin), pose(x, b), T);
-    sum += r.dot(covariance.ldlt().solve(r)), ++stretches;
+    sum += r.dot(Ldlt<6>(covariance).solve(r)), ++stretches;
     end.reset();
   }
   return stretches == 0 ? 1 : sum / (6 * stretches);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/anchor_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -128,7 +129,7 @@ Mat4 refine(const Judges& judges, Placement& x) {
       information += J.transpose() * J;
       b -= J.transpose() * r;
     }
-    const Vec4 step = information.ldlt().solve(b);
+    const Vec4 step = Ldlt<4>(information).solve(b);
     if (!step.allFinite()) return Mat4::Zero();
     x.p_A += step.head<3>();
     x.yaw_rad += step[3];

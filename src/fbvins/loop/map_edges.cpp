@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/ldlt.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -43,20 +45,20 @@ MapEdge loop_edge(const Pose<B, C0>& T_BC_candidate, const Pose<B, C0>& T_BC_que
   J.topLeftCorner<3, 3>() = -T_qc.R().transpose();
   J.topRightCorner<3, 3>() = hat(T_cq.p);
   J.bottomRightCorner<3, 3>() = -T_qc.R();
-  const Mat6 cov_cq = kLoopInflation * J * pose.information.inverse() * J.transpose();
+  const Mat6 cov_cq = kLoopInflation * J * inverted(pose.information) * J.transpose();
   const Pose<B, B> T_BCc(T_BC_candidate.q, T_BC_candidate.p), T_CqB(T_BC_query.cast_frames<B, B>().inverse());
   Mat6 cov = compose_covariance(T_BCc, Mat6::Zero(), T_cq, cov_cq);
   cov = compose_covariance(T_BCc * T_cq, cov, T_CqB, Mat6::Zero());
   cov *= 1 + T_cq.p.squaredNorm() / (kAlike_m * kAlike_m);
   cov.diagonal().head<3>().array() += kLoopFloor_m * kLoopFloor_m;
   cov.diagonal().tail<3>().array() += kLoopFloor_rad * kLoopFloor_rad;
-  return {candidate, {}, T_BCc * T_cq * T_CqB, symmetric(cov.inverse()), MapEdge::Kind::loop, nullptr};
+  return {candidate, {}, T_BCc * T_cq * T_CqB, symmetric(inverted(cov)), MapEdge::Kind::loop, nullptr};
 }
 
 MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge, double metre) {
   MeasuredPose seen;
   seen.T_MB = from.T_MB * Pose<B, B>(edge.T_from_to.q, Vec3(metre * edge.T_from_to.p));
-  const Mat6 cov = edge.information.inverse();
+  const Mat6 cov = inverted(edge.information);
   const Mat3 R = from.T_MB.R(), R_q = seen.T_MB.R();
   // Position in M and the rotation's part about M's z.
   Eigen::Matrix<double, 4, 6> J = Eigen::Matrix<double, 4, 6>::Zero();

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/map_frame.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/loop/pose_graph.hpp"
 
 namespace fbvins {
@@ -107,18 +107,18 @@ Vec4 MapFrame::innovation(const MeasuredPose& seen) const {
 
 double MapFrame::mahalanobis2(const MeasuredPose& seen) const {
   const Vec4 v = innovation(seen);
-  return v.dot((P_ + seen.covariance).ldlt().solve(v));
+  return v.dot(Ldlt<4>(P_ + seen.covariance).solve(v));
 }
 
 void MapFrame::update(const MeasuredPose& seen) {
   const Vec4 v = innovation(seen);
   const Mat4 S = P_ + seen.covariance;
-  const Mat4 K = S.ldlt().solve(P_).transpose();
+  const Mat4 K = Ldlt<4>(S).solve(P_).transpose();
   const Vec4 d = K * v;
   const Mat4 A = Mat4::Identity() - K;
   P_ = A * P_ * A.transpose() + K * seen.covariance * K.transpose();
   if (scale_.variance > 0) {
-    const Vec4 gain = S.ldlt().solve(scale_.with);
+    const Vec4 gain = Ldlt<4>(S).solve(scale_.with);
     scale_.log += gain.dot(v);
     scale_.variance -= gain.dot(scale_.with);
     scale_.with = A * scale_.with;
@@ -139,18 +139,18 @@ MapFrame::Whitened MapFrame::innovation(const PartialPose& seen, const Pose<G, B
 
 double MapFrame::mahalanobis2(const PartialPose& seen, const Pose<G, B>& T_GB) const {
   const auto [v, H] = innovation(seen, T_GB);
-  return v.dot(Mat6(H * P_ * H.transpose() + Mat6::Identity()).ldlt().solve(v));
+  return v.dot(Ldlt<6>(H * P_ * H.transpose() + Mat6::Identity()).solve(v));
 }
 
 void MapFrame::update(const PartialPose& seen, const Pose<G, B>& T_GB) {
   const auto [v, H] = innovation(seen, T_GB);
   const Mat6 S = H * P_ * H.transpose() + Mat6::Identity();
-  const Eigen::Matrix<double, 4, 6> K = S.ldlt().solve(H * P_).transpose();
+  const Eigen::Matrix<double, 4, 6> K = Ldlt<6>(S).solve(Eigen::Matrix<double, 6, 4>(H * P_)).transpose();
   const Vec4 d = K * v;
   const Mat4 remains = Mat4::Identity() - K * H;
   P_ = remains * P_ * remains.transpose() + K * K.transpose();
   if (scale_.variance > 0) {
-    const Vec6 gain = S.ldlt().solve(H * scale_.with);
+    const Vec6 gain = Ldlt<6>(S).solve(Vec6(H * scale_.with));
     scale_.log += gain.dot(v);
     scale_.variance -= gain.dot(H * scale_.with);
     scale_.with = remains * scale_.with;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/map_tags.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <iterator>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -52,7 +53,7 @@ MapEdge tag_edge(const MapTag& before, const MapTag& now) {
   const Pose<B, B> T_aT = as_body(before.T_BT), T_bT = as_body(now.T_BT);
   const Mat6 covariance =
       compose_covariance(T_aT, floored(before.covariance), T_bT.inverse(), of_inverse(T_bT, floored(now.covariance)));
-  const Mat6 information = covariance.inverse();
+  const Mat6 information = inverted(covariance);
   return {before.keyframe,     now.keyframe, T_aT * T_bT.inverse(), 0.5 * (information + information.transpose()),
           MapEdge::Kind::loop, nullptr};
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/odometry_drift.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -23,7 +24,7 @@ void OdometryDrift::take(const Mat6& covariance, const GaugeState& gauge, double
   const Vec3 up_B = gauge.T_GB.q.conjugate() * gauge.up_G();
   // A wrong attitude displaces the position as well, which the graph does itself: of the position only what remains is drift.
   const Mat3 P_p = covariance.topLeftCorner<3, 3>() -
-                   covariance.topRightCorner<3, 3>() * P_theta.ldlt().solve(Mat3(covariance.bottomLeftCorner<3, 3>()));
+                   covariance.topRightCorner<3, 3>() * Ldlt<3>(P_theta).solve(Mat3(covariance.bottomLeftCorner<3, 3>()));
   const Uncertainty now_is{path_m, P_p.trace() / 3, up_B.dot(P_theta * up_B)};
   if (!first_) first_ = now_is;
   const double way_m = path_m - first_->path_m;

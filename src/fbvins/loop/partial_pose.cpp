@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/partial_pose.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -42,7 +43,7 @@ PartialPose measurement(const TagAnchor& a) {
   Mat6 cov = J * a.covariance * J.transpose();
   cov.diagonal().head<3>().array() += kTagFloor_m * kTagFloor_m;
   cov.diagonal().tail<3>().array() += kTagFloor_rad * kTagFloor_rad;
-  const Mat6 information = cov.inverse();
+  const Mat6 information = inverted(cov);
   out.information = 0.5 * (information + information.transpose());
   return out;
 }
@@ -72,7 +73,7 @@ Mat6 widened(const Mat6& information, const Mat6& L) {
   const Mat6 S = root_of(information);
   const Mat6 W = S * L;
   const Mat6 inner = Mat6::Identity() + W * W.transpose();
-  const Mat6 out = S.transpose() * inner.ldlt().solve(S);
+  const Mat6 out = S.transpose() * Ldlt<6>(inner).solve(S);
   return 0.5 * (out + out.transpose());
 }
 

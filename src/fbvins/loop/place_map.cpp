@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/place_map.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/imu/preintegration.hpp"
 #include "fbvins/loop/map_tags.hpp"
 #include "fbvins/loop/place_store.hpp"
@@ -39,8 +39,8 @@ std::shared_ptr<const Preintegration> joined(const MapEdge& first, const MapEdge
 
 MapEdge composed(const MapEdge& first, const MapEdge& second, MapEdge::Kind kind) {
   const Mat6 cov =
-      compose_covariance(first.T_from_to, first.information.inverse(), second.T_from_to, second.information.inverse());
-  const Mat6 information = cov.inverse();
+      compose_covariance(first.T_from_to, inverted(first.information), second.T_from_to, inverted(second.information));
+  const Mat6 information = inverted(cov);
   return {
       first.from,           second.to, first.T_from_to * second.T_from_to, 0.5 * (information + information.transpose()), kind,
       joined(first, second)};
@@ -55,8 +55,8 @@ MapEdge reversed(const MapEdge& e) {
   J.topLeftCorner<3, 3>() = -R.transpose();
   J.topRightCorner<3, 3>() = hat(-inverse.p).transpose();
   J.bottomRightCorner<3, 3>() = -R;
-  const Mat6 cov = J * e.information.inverse() * J.transpose();
-  const Mat6 information = cov.inverse();
+  const Mat6 cov = J * inverted(e.information) * J.transpose();
+  const Mat6 information = inverted(cov);
   return {e.to, e.from, inverse, 0.5 * (information + information.transpose()), e.kind, nullptr};
 }
 
@@ -131,9 +131,9 @@ void PlaceMap::remove(KeyframeId id) {
     }
   for (MapAnchor& a : anchors)
     if (a.keyframe == id && bridge != nullptr)
-      a = {bridge->from, carried(a.measured, bridge->T_from_to, bridge->information.inverse())};
+      a = {bridge->from, carried(a.measured, bridge->T_from_to, inverted(bridge->information))};
   for (MapTag& t : tags)
-    if (t.keyframe == id && bridge != nullptr) t = carried(t, bridge->from, bridge->T_from_to, bridge->information.inverse());
+    if (t.keyframe == id && bridge != nullptr) t = carried(t, bridge->from, bridge->T_from_to, inverted(bridge->information));
   std::erase_if(anchors, [&](const MapAnchor& a) { return a.keyframe == id; });
   std::erase_if(tags, [&](const MapTag& t) { return t.keyframe == id; });
   std::erase_if(edges, [&](const MapEdge& e) { return e.from == id || e.to == id; });
@@ -269,9 +269,9 @@ void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0) {
   for (std::size_t i = 1; i < map.cameras.size(); ++i) map.cameras[i] = T_new_old * map.cameras[i];
   for (MapKeyframe& k : map.keyframes()) k.T_MB = k.T_MB * T_old_new, k.T_GB = k.T_GB * T_old_new;
   for (MapEdge& e : map.edges) {
-    Mat6 cov = compose_covariance(T_new_old, Mat6::Zero(), e.T_from_to, e.information.inverse());
+    Mat6 cov = compose_covariance(T_new_old, Mat6::Zero(), e.T_from_to, inverted(e.information));
     cov = compose_covariance(T_new_old * e.T_from_to, cov, T_old_new, Mat6::Zero());
-    const Mat6 information = cov.inverse();
+    const Mat6 information = inverted(cov);
     e.T_from_to = T_new_old * e.T_from_to * T_old_new;
     e.information = 0.5 * (information + information.transpose());
     e.imu = nullptr;

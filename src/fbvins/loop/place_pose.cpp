@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/place_pose.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/geometry/p3p.hpp"
 
 namespace fbvins {
@@ -183,7 +183,7 @@ RelativePose refine_pose(const Place& query, const Place& candidate, std::span<c
       b -= JtW * m.term.r;
     }
     H.diagonal().array() += kDamping;
-    const Vec6 step = H.ldlt().solve(b);
+    const Vec6 step = Ldlt<6>(H).solve(b);
     if (!step.allFinite() || step.norm() > kDivergedStep) return out;
     out.T_qc = out.T_qc.boxplus(step.head<3>(), step.tail<3>());
     for (Matched& m : terms)

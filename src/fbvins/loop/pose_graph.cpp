@@ -4,11 +4,11 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/loop/graph_costs.hpp"
 
 namespace fbvins {
@@ -99,11 +99,11 @@ Mat6 PoseGraph::weighted_information(const PoseGraphEdge& e, const PoseGraphOpti
   const double weight = e.loop ? std::max(e.weight, kMinWeight) : 1.0;
   if (!e.loop || options.degrees_of_freedom == 6) return weight * e.information;
   const double tilt = kTilt_rad;
-  Mat6 cov = e.information.inverse();
+  Mat6 cov = inverted(e.information);
   const Vec3& up = up_B_[static_cast<std::size_t>(e.b)];
   cov.topLeftCorner<3, 3>().diagonal().array() += tilt * tilt * e.T_ab.p.squaredNorm();
   cov.bottomRightCorner<3, 3>() += 2 * tilt * tilt * (Mat3::Identity() - up * up.transpose());
-  const Mat6 information = cov.inverse();
+  const Mat6 information = inverted(cov);
   return weight * 0.5 * (information + information.transpose());
 }
 

@@ -3,13 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/geometry/heading.hpp"
+#include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
 namespace {
@@ -129,7 +128,7 @@ void fit_translations(const std::vector<HandEyePair>& pairs, MarkerCalibration& 
       A += weight * J.transpose() * J;
       b += weight * J.transpose() * (c.T_VW.q.conjugate() * pair.T_VK.p - pair.T_WB.p);
     }
-    const Vec6 x = A.ldlt().solve(b);
+    const Vec6 x = Ldlt<6>(A).solve(b);
     c.T_BK.p = x.head<3>();
     c.T_VW.p = c.T_VW.q * Vec3(x.tail<3>());
     if (i > 0) scale = std::max(1.5 * median_of(sizes), kSmallestScale_m);

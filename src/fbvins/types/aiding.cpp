@@ -5,6 +5,14 @@
 
 namespace fbvins {
 
+Time& stamp_of(AidingSample& reading) {
+  return std::visit([](auto& r) -> Time& { return r.t; }, reading);
+}
+
+Time stamp_of(const AidingSample& reading) {
+  return std::visit([](const auto& r) { return r.t; }, reading);
+}
+
 std::string impossible(const VelocitySample& r) {
   if (!r.p_B.allFinite() || !r.q_BS.coeffs().allFinite()) return "a velocity's place or axes are not finite";
   if (std::abs(r.q_BS.norm() - 1) > 1e-3) return "a velocity's axes are not a rotation";

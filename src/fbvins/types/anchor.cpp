@@ -34,6 +34,10 @@ std::string fault(const TagAnchor& a) {
 
 }  // namespace
 
+Time stamp_of(const Anchor& anchor) {
+  return std::visit([](const auto& a) { return a.t; }, anchor);
+}
+
 std::string impossible(const Anchor& anchor) {
   const std::string why = std::visit([](const auto& a) { return fault(a); }, anchor);
   return why.empty() ? why : fmt::format("the anchor at {} ns is impossible: {}", stamp_of(anchor).ns, why);
