@@ -31,9 +31,13 @@ FBVINS_INLINE void exp_of_negative(F16& x) {
   p = p * r + 1.6666665459e-1f;
   p = p * r + 5.0000001201e-1f;
   p = p * r * r + r + 1.0f;
-  const I16 exponent = (__builtin_convertvector(whole, I16) + 127) << 23;
   F16 power;
-  std::memcpy(&power, &exponent, sizeof(power));
+#pragma GCC unroll 4
+  for (int i = 0; i < F16::kParts; ++i) {
+    using Whole = Lanes<std::int32_t, F16::kInPart>::Part;
+    const Whole exponent = (__builtin_convertvector(whole.part[i], Whole) + 127) << 23;
+    std::memcpy(&power.part[i], &exponent, sizeof(exponent));
+  }
   x = p * power;
 }
 

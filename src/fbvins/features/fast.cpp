@@ -6,14 +6,14 @@
 #include <cassert>
 #include <cstring>
 
-#include "fbvins/core/simd.hpp"
-#include "fbvins/features/lanes.hpp"
+#include "fbvins/core/lanes.hpp"
 
 namespace fbvins {
 namespace {
 
 constexpr int kBlock = kFastBlock;
-using Bytes = std::uint8_t __attribute__((vector_size(kBlock)));
+using Block = Lanes<std::uint8_t, kBlock>;
+using Bytes = Block::Part;
 
 FBVINS_INLINE void load(const std::uint8_t* p, Bytes& v) { std::memcpy(&v, p, sizeof(v)); }
 FBVINS_INLINE void smaller(const Bytes& a, const Bytes& b, Bytes& out) { out = a < b ? a : b; }
@@ -84,7 +84,7 @@ FBVINS_INLINE void difference(const Bytes& centre, const Bytes& bright, const By
   larger(above, below, out);
 }
 
-FBVINS_INLINE void strength_of_block(const Rows& rows, int x, Bytes& strength) {
+FBVINS_INLINE void strength_at(const Rows& rows, int x, Bytes& strength) {
   Bytes c, p[16], bright, dark;
   load_circle(rows, x, p);
   best_arc<false>(p, bright);
@@ -93,15 +93,19 @@ FBVINS_INLINE void strength_of_block(const Rows& rows, int x, Bytes& strength) {
   difference(c, bright, dark, strength);
 }
 
-FBVINS_INLINE bool exceeds(const Bytes& v, const std::uint8_t* limits) {
-  Bytes limit, most;
+/// Zero where the limit is not exceeded.
+FBVINS_INLINE void excess_of(const Bytes& strength, const std::uint8_t* limits, Bytes& excess) {
+  Bytes limit;
   load(limits, limit);
-  larger(v, limit, most);
-  most -= limit;
+  larger(strength, limit, excess);
+  excess -= limit;
+}
+
+FBVINS_INLINE bool any(const Bytes& v) {
   using Half = std::uint64_t __attribute__((vector_size(16)));
-  Half halves[kBlock / 16];
-  std::memcpy(halves, &most, sizeof(halves));
-  for (int i = 1; i < kBlock / 16; ++i) halves[0] |= halves[i];
+  Half halves[sizeof(Bytes) / sizeof(Half)];
+  std::memcpy(halves, &v, sizeof(halves));
+  for (std::size_t i = 1; i < std::size(halves); ++i) halves[0] |= halves[i];
   return (halves[0][0] | halves[0][1]) != 0;
 }
 
@@ -128,10 +132,17 @@ void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int co
                        std::uint8_t* strength, std::uint8_t* found) {
   const Rows rows(centre, stride);
   for (int x = 0; x < count; x += kBlock) {
-    Bytes best;
-    strength_of_block(rows, x, best);
-    found[x / kBlock] = exceeds(best, limits + x);
-    std::memcpy(strength + x, &best, sizeof(best));
+    Bytes excess, exceeded{};
+#pragma GCC unroll 2
+    for (int i = 0; i < Block::kParts; ++i) {
+      const int first = x + i * Block::kInPart;
+      Bytes best;
+      strength_at(rows, first, best);
+      excess_of(best, limits + first, excess);
+      exceeded |= excess;
+      std::memcpy(strength + first, &best, sizeof(best));
+    }
+    found[x / kBlock] = any(exceeded);
   }
 }
 

@@ -153,6 +153,16 @@ FBVINS_VNNI void sums_vnni(const std::int8_t* values, const std::int8_t* weights
 
 #define FBVINS_DOT __attribute__((target("arch=armv8.2-a+dotprod")))
 
+/// Adds to the sums of each row the products of the inputs 4 * (g + lane) on; `a` has sixteen inputs of each row, from 4 * g on.
+template <int Lane>
+FBVINS_DOT FBVINS_INLINE void add_products(const std::int8_t* weights, const int8x16_t (&a)[kRows], int32x4_t (&sum)[kRows][4]) {
+  const int8x16_t w[4] = {vld1q_s8(weights), vld1q_s8(weights + 16), vld1q_s8(weights + 32), vld1q_s8(weights + 48)};
+#pragma GCC unroll 4
+  for (int r = 0; r < kRows; ++r)
+#pragma GCC unroll 4
+    for (int i = 0; i < 4; ++i) sum[r][i] = vdotq_laneq_s32(sum[r][i], w[i], a[r], Lane);
+}
+
 FBVINS_DOT void sums_neon(const std::int8_t* values, const std::int8_t* weights, const std::int32_t*, int inputs, int blocks,
                           std::int32_t* sums) {
   for (int block = 0; block < blocks; ++block) {
@@ -160,18 +170,22 @@ FBVINS_DOT void sums_neon(const std::int8_t* values, const std::int8_t* weights,
     int32x4_t sum[kRows][4];
     for (auto& row : sum)
       for (int32x4_t& s : row) s = vdupq_n_s32(0);
-    for (int g = 0; g < inputs / 4; ++g) {
-      const int8x16_t w0 = vld1q_s8(w + 64 * g), w1 = vld1q_s8(w + 64 * g + 16), w2 = vld1q_s8(w + 64 * g + 32),
-                      w3 = vld1q_s8(w + 64 * g + 48);
+    int8x16_t a[kRows];
+    int k = 0;
+    for (; k + 16 <= inputs; k += 16, w += 256) {
+      for (int r = 0; r < kRows; ++r) a[r] = vld1q_s8(values + r * inputs + k);
+      add_products<0>(w, a, sum);
+      add_products<1>(w + 64, a, sum);
+      add_products<2>(w + 128, a, sum);
+      add_products<3>(w + 192, a, sum);
+    }
+    for (; k < inputs; k += 4, w += 64) {
       for (int r = 0; r < kRows; ++r) {
         std::int32_t four;
-        std::memcpy(&four, values + r * inputs + 4 * g, 4);
-        const int8x16_t a = vreinterpretq_s8_s32(vdupq_n_s32(four));
-        sum[r][0] = vdotq_s32(sum[r][0], w0, a);
-        sum[r][1] = vdotq_s32(sum[r][1], w1, a);
-        sum[r][2] = vdotq_s32(sum[r][2], w2, a);
-        sum[r][3] = vdotq_s32(sum[r][3], w3, a);
+        std::memcpy(&four, values + r * inputs + k, 4);
+        a[r] = vreinterpretq_s8_s32(vdupq_n_s32(four));
       }
+      add_products<0>(w, a, sum);
     }
     for (int r = 0; r < kRows; ++r)
       for (int i = 0; i < 4; ++i) vst1q_s32(sums + r * 16 * kTogether + 16 * block + 4 * i, sum[r][i]);

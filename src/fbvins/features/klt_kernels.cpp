@@ -10,11 +10,31 @@ namespace {
 constexpr int kP = kKltPatch;
 static_assert(kP == kLanes, "one patch row is one set of lanes");
 
-FBVINS_INLINE void blend_row(const std::uint8_t* p, float fx, F16& out) {
-  F16 a, b;
+/// What a row of a grid has beyond a patch's.
+using End = Lanes<float, F16::kInPart>;
+
+template <int N>
+FBVINS_INLINE void blend_row(const std::uint8_t* p, float fx, Lanes<float, N>& out) {
+  Lanes<float, N> a, b;
   load_lanes(p, a);
   load_lanes(p + 1, b);
   out = a + (b - a) * fx;
+}
+
+/// Calls add(samples, place of the row's first sample in the patch) for each row.
+template <class Add>
+FBVINS_INLINE void blend_rows(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, Add add) {
+  F16 upper, lower;
+  blend_row(p, fx, upper);
+  for (int y = 0; y < kP; y += 2) {
+#pragma GCC unroll 2
+    for (int i = 0; i < 2; ++i) {
+      p += stride;
+      blend_row(p, fx, lower);
+      add(upper + (lower - upper) * fy, (y + i) * kP);
+      upper = lower;
+    }
+  }
 }
 
 /// What a row of samples adds to the moments of a patch.
@@ -33,34 +53,27 @@ FBVINS_INLINE void add_row(const F16& value, const float* wt, const float* w, F1
 FBVINS_KERNEL
 void project_patch(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* wgx, const float* wgy,
                    const float* wt, Projections& out) {
-  F16 sgx = {}, sgy = {}, st = {}, upper, lower;
-  blend_row(p, fx, upper);
-  for (int y = 0; y < kP; ++y) {
-    blend_row(p + (y + 1) * stride, fx, lower);
-    const F16 value = upper + (lower - upper) * fy;
-    upper = lower;
-    F16 a, b, c;
-    load_lanes(wgx + y * kP, a);
-    load_lanes(wgy + y * kP, b);
-    load_lanes(wt + y * kP, c);
-    sgx += a * value;
-    sgy += b * value;
-    st += c * value;
-  }
+  F16 sgx = {}, sgy = {}, st = {};
+  blend_rows(
+      p, stride, fx, fy, [&](const F16& value, int at) __attribute__((always_inline)) {
+        F16 a, b, c;
+        load_lanes(wgx + at, a);
+        load_lanes(wgy + at, b);
+        load_lanes(wt + at, c);
+        sgx += a * value;
+        sgy += b * value;
+        st += c * value;
+      });
   out = {sum_lanes(sgx), sum_lanes(sgy), sum_lanes(st)};
 }
 
 FBVINS_KERNEL
 void patch_moments(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* wt, const float* w,
                    PatchMoments& out) {
-  F16 st = {}, s1 = {}, s2 = {}, upper, lower;
-  blend_row(p, fx, upper);
-  for (int y = 0; y < kP; ++y) {
-    blend_row(p + (y + 1) * stride, fx, lower);
-    const F16 value = upper + (lower - upper) * fy;
-    upper = lower;
-    add_row(value, wt + y * kP, w + y * kP, st, s1, s2);
-  }
+  F16 st = {}, s1 = {}, s2 = {};
+  blend_rows(
+      p, stride, fx,
+      fy, [&](const F16& value, int at) __attribute__((always_inline)) { add_row(value, wt + at, w + at, st, s1, s2); });
   out = {sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
 }
 
@@ -76,14 +89,15 @@ void pixel_moments(const std::uint8_t* p, std::ptrdiff_t stride, const float* wt
 
 FBVINS_KERNEL
 void sample_grid(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, float* grid) {
-  F16 upper, lower, upper_end, lower_end;
+  F16 upper, lower;
+  End upper_end, lower_end;
   blend_row(p, fx, upper);
-  blend_row(p + 2, fx, upper_end);
+  blend_row(p + kP, fx, upper_end);
   for (int y = 0; y < kGrid; ++y) {
     blend_row(p + (y + 1) * stride, fx, lower);
-    blend_row(p + (y + 1) * stride + 2, fx, lower_end);
+    blend_row(p + (y + 1) * stride + kP, fx, lower_end);
     store_lanes(upper + (lower - upper) * fy, grid + y * kGridStride);
-    store_lanes(upper_end + (lower_end - upper_end) * fy, grid + y * kGridStride + 2);
+    store_lanes(upper_end + (lower_end - upper_end) * fy, grid + y * kGridStride + kP);
     upper = lower;
     upper_end = lower_end;
   }
@@ -91,60 +105,81 @@ void sample_grid(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float f
 
 FBVINS_KERNEL
 void sample_warped(const std::uint8_t* block, int side, float u0, float v0, float ux, float uy, float vx, float vy, float* grid) {
-  // Places and weights of a row are computed as lanes, its pixels fetched one by one.
-  constexpr int kRow = (kGrid + kLanes - 1) / kLanes * kLanes;
-  float fu[kRow], fv[kRow];
-  std::int32_t at[kRow], p00[kRow], p01[kRow], p10[kRow], p11[kRow];
-  for (int y = 0; y < kGrid; ++y) {
+  // Places and weights of a row are computed as lanes, its pixels fetched two by two.
+  constexpr int kRow = (kGrid + F16::kInPart - 1) / F16::kInPart * F16::kInPart;
+  float u_of_row[kRow], v_of_row[kRow], fu[kRow], fv[kRow];
+  std::int32_t at[kRow];
+  std::uint16_t upper[kRow], lower[kRow];
+  for (int x = 0; x < kRow; ++x) {
+    u_of_row[x] = u0 + static_cast<float>(x) * ux;
+    v_of_row[x] = v0 + static_cast<float>(x) * vx;
+  }
+  for (int x = kGrid; x < kRow; ++x) upper[x] = lower[x] = 0;
+  for (int y = 0; y < kGrid; ++y, grid += kGridStride) {
     for (int x = 0; x < kRow; ++x) {
-      const float u = u0 + static_cast<float>(x) * ux + static_cast<float>(y) * uy;
-      const float v = v0 + static_cast<float>(x) * vx + static_cast<float>(y) * vy;
+      const float u = u_of_row[x] + static_cast<float>(y) * uy;
+      const float v = v_of_row[x] + static_cast<float>(y) * vy;
       const auto iu = static_cast<std::int32_t>(u), iv = static_cast<std::int32_t>(v);
       fu[x] = u - static_cast<float>(iu);
       fv[x] = v - static_cast<float>(iv);
       at[x] = iv * side + iu;
     }
+#pragma GCC unroll 18
     for (int x = 0; x < kGrid; ++x) {
       const std::uint8_t* p = block + at[x];
-      p00[x] = p[0], p01[x] = p[1], p10[x] = p[side], p11[x] = p[side + 1];
+      std::memcpy(upper + x, p, 2);
+      std::memcpy(lower + x, p + side, 2);
     }
-    for (int x = 0; x < kGrid; ++x) {
-      const float top = static_cast<float>(p00[x]) + static_cast<float>(p01[x] - p00[x]) * fu[x];
-      const float bottom = static_cast<float>(p10[x]) + static_cast<float>(p11[x] - p10[x]) * fu[x];
-      grid[y * kGridStride + x] = top + (bottom - top) * fv[x];
+    for (int x = 0; x < kRow; ++x) {
+      const std::int32_t p00 = upper[x] & 255, p01 = upper[x] >> 8, p10 = lower[x] & 255, p11 = lower[x] >> 8;
+      const float top = static_cast<float>(p00) + static_cast<float>(p01 - p00) * fu[x];
+      const float bottom = static_cast<float>(p10) + static_cast<float>(p11 - p10) * fu[x];
+      grid[x] = top + (bottom - top) * fv[x];
     }
+  }
+}
+
+/// Of the N columns from the first on; adds to the sums, which are each N lanes.
+template <int N>
+FBVINS_INLINE void differentiate_columns(const float* grid, const float* w, float* t, float* gx, float* gy,
+                                         Lanes<float, N> (&sums)[9]) {
+  for (int y = 0; y < kP; ++y, grid += kGridStride, w += kP, t += kP, gx += kP, gy += kP) {
+    Lanes<float, N> value, left, right, above, below, weight;
+    load_lanes(grid + kGridStride + 1, value);
+    load_lanes(grid + kGridStride, left);
+    load_lanes(grid + kGridStride + 2, right);
+    load_lanes(grid + 1, above);
+    load_lanes(grid + 2 * kGridStride + 1, below);
+    load_lanes(w, weight);
+    const Lanes<float, N> dx = (right - left) * 0.5f;
+    const Lanes<float, N> dy = (below - above) * 0.5f;
+    store_lanes(value, t);
+    store_lanes(dx, gx);
+    store_lanes(dy, gy);
+    const Lanes<float, N> wv = weight * value, wdx = weight * dx, wdy = weight * dy;
+    sums[0] += wv;
+    sums[1] += wdx;
+    sums[2] += wdy;
+    sums[3] += wv * value;
+    sums[4] += wv * dx;
+    sums[5] += wv * dy;
+    sums[6] += wdx * dx;
+    sums[7] += wdx * dy;
+    sums[8] += wdy * dy;
   }
 }
 
 FBVINS_KERNEL
 void differentiate(const float* grid, const float* w, float* t, float* gx, float* gy, TemplateMoments& m) {
-  F16 st = {}, sgx = {}, sgy = {}, stt = {}, stgx = {}, stgy = {}, sgxx = {}, sgxy = {}, sgyy = {};
-  for (int y = 0; y < kP; ++y) {
-    F16 value, left, right, above, below, weight;
-    load_lanes(grid + (y + 1) * kGridStride + 1, value);
-    load_lanes(grid + (y + 1) * kGridStride, left);
-    load_lanes(grid + (y + 1) * kGridStride + 2, right);
-    load_lanes(grid + y * kGridStride + 1, above);
-    load_lanes(grid + (y + 2) * kGridStride + 1, below);
-    load_lanes(w + y * kP, weight);
-    const F16 dx = (right - left) * 0.5f;
-    const F16 dy = (below - above) * 0.5f;
-    store_lanes(value, t + y * kP);
-    store_lanes(dx, gx + y * kP);
-    store_lanes(dy, gy + y * kP);
-    const F16 wv = weight * value, wdx = weight * dx, wdy = weight * dy;
-    st += wv;
-    sgx += wdx;
-    sgy += wdy;
-    stt += wv * value;
-    stgx += wv * dx;
-    stgy += wv * dy;
-    sgxx += wdx * dx;
-    sgxy += wdx * dy;
-    sgyy += wdy * dy;
-  }
-  m = {sum_lanes(st),   sum_lanes(sgx),  sum_lanes(sgy),  sum_lanes(stt), sum_lanes(stgx),
-       sum_lanes(stgy), sum_lanes(sgxx), sum_lanes(sgxy), sum_lanes(sgyy)};
+  // By halves of the columns, so that the sums stay in registers.
+  constexpr int kHalf = kP / 2;
+  Lanes<float, kHalf> left[9] = {}, right[9] = {};
+  differentiate_columns(grid, w, t, gx, gy, left);
+  differentiate_columns(grid + kHalf, w + kHalf, t + kHalf, gx + kHalf, gy + kHalf, right);
+  float sum[9];
+#pragma GCC unroll 9
+  for (int i = 0; i < 9; ++i) sum[i] = sum_lanes(left[i] + right[i]);
+  m = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5], sum[6], sum[7], sum[8]};
 }
 
 FBVINS_KERNEL

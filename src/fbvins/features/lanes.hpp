@@ -1,39 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sixteen float lanes (a GCC/Clang vector type, lowered to whatever registers the target has).
-// Explicit lanes let a reduction vectorise without -ffast-math, with the same bits on every target.
+// Sixteen float lanes: from bytes, and their sum.
 #pragma once
 
 #include <bit>
 #include <cstdint>
 #include <cstring>
 
-#include "fbvins/core/simd.hpp"
+#include "fbvins/core/lanes.hpp"
+
+#if defined(__aarch64__)
+#include <arm_neon.h>
+#endif
 
 namespace fbvins {
 
 inline constexpr int kLanes = 16;
-using F16 = float __attribute__((vector_size(64)));
-using I16 = std::int32_t __attribute__((vector_size(64)));
-using U16x16 = std::uint16_t __attribute__((vector_size(32)));
+using F16 = Lanes<float, kLanes>;
 using U8x16 = std::uint8_t __attribute__((vector_size(16)));
 
-FBVINS_INLINE void load_lanes(const std::uint8_t* p, F16& out) {
+/// Bytes to lanes. Sixteen bytes are read, however many lanes there are.
+template <int N>
+FBVINS_INLINE void load_lanes(const std::uint8_t* p, Lanes<float, N>& out) {
+  constexpr int kInPart = Lanes<float, N>::kInPart;
+#if defined(__aarch64__)
+  const uint8x16_t bytes = vld1q_u8(p);
+#pragma GCC unroll 4
+  for (int i = 0; i < N / kInPart; ++i) {
+    // Four bytes to the lowest places of four numbers; a place beyond the table gives zero.
+    const auto first = static_cast<std::uint32_t>(kInPart * i);
+    const uint32x4_t places = {0xffffff00 + first, 0xffffff01 + first, 0xffffff02 + first, 0xffffff03 + first};
+    out.part[i] = vcvtq_f32_u32(vreinterpretq_u32_u8(vqtbl1q_u8(bytes, vreinterpretq_u8_u32(places))));
+  }
+#else
+  // Widened in steps of two: GCC 12 falls back to scalars for a step of four.
+  using U16x16 = std::uint16_t __attribute__((vector_size(32)));
   U8x16 bytes;
   std::memcpy(&bytes, p, sizeof(bytes));
-  // Widened in steps of two: GCC 12 falls back to scalars for a step of four.
-  out = __builtin_convertvector(__builtin_convertvector(__builtin_convertvector(bytes, U16x16), I16), F16);
+  const U16x16 wide = __builtin_convertvector(bytes, U16x16);
+#pragma GCC unroll 4
+  for (int i = 0; i < N / kInPart; ++i) {
+    typename Lanes<std::uint16_t, kInPart>::Part part;
+    std::memcpy(&part, reinterpret_cast<const char*>(&wide) + i * sizeof(part), sizeof(part));
+    out.part[i] = __builtin_convertvector(__builtin_convertvector(part, typename Lanes<std::int32_t, kInPart>::Part),
+                                          typename Lanes<float, N>::Part);
+  }
+#endif
 }
 
-FBVINS_INLINE void load_lanes(const float* p, F16& out) { std::memcpy(&out, p, sizeof(out)); }
-FBVINS_INLINE void store_lanes(const F16& v, float* p) { std::memcpy(p, &v, sizeof(v)); }
-
-/// Sum of the lanes, pairwise in a fixed order.
-FBVINS_INLINE float sum_lanes(const F16& v) {
-  float a[kLanes];
-  std::memcpy(a, &v, sizeof(v));
-  for (int half = kLanes / 2; half > 0; half /= 2)
-    for (int i = 0; i < half; ++i) a[i] += a[i + half];
-  return a[0];
+/// Sum of the lanes, pairwise: the upper half is added to the lower one, and so on.
+template <int N>
+FBVINS_INLINE float sum_lanes(const Lanes<float, N>& v) {
+  using Four = float __attribute__((vector_size(16)));
+  constexpr int kFours = N / 4, kInPart = Lanes<float, N>::kInPart / 4;
+  Four s[kFours];
+#pragma GCC unroll 4
+  for (int i = 0; i < kFours; ++i)
+    std::memcpy(&s[i], reinterpret_cast<const char*>(&v.part[i / kInPart]) + i % kInPart * sizeof(Four), sizeof(Four));
+#pragma GCC unroll 4
+  for (int half = kFours / 2; half > 0; half /= 2)
+#pragma GCC unroll 4
+    for (int i = 0; i < half; ++i) s[i] += s[i + half];
+  return (s[0][0] + s[0][2]) + (s[0][1] + s[0][3]);
 }
 
 /// 256 flags, each 0 or 1, as bits: the first in the lowest of the first word.

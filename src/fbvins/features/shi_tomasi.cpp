@@ -7,11 +7,18 @@
 
 #include "fbvins/core/simd.hpp"
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+
 namespace fbvins {
 namespace {
 
 constexpr int kWindow = 7;  // side of the structure tensor's window
 constexpr int kHalf = kWindow / 2;
+constexpr int kStep = 16;                    // responses that are computed together
 constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is searched
 constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not give enough
 constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
@@ -24,46 +31,57 @@ constexpr double kNoiseFactor = 5.0;
 /// smaller eigenvalue over a 7x7 window comes out about a third below the mean.
 constexpr double kNoiseResponse = 0.12;
 
-/// Products of the Sobel gradients of one row, count values each into xx, xy, yy.
+/// Products of the Sobel gradients of one row in place of those of the row that leaves the window; `sums` has those of the
+/// window. xx, xy and yy are each `count` of both.
 FBVINS_KERNEL
-void structure_row(const std::uint8_t* p, std::ptrdiff_t stride, int count, std::int32_t* xx, std::int32_t* xy,
-                   std::int32_t* yy) {
+void move_window(const std::uint8_t* p, std::ptrdiff_t stride, int count, std::int32_t* __restrict products,
+                 std::int32_t* __restrict sums) {
   const std::uint8_t* a = p - stride;
   const std::uint8_t* b = p + stride;
+  const auto replace = [&](int at, int product) __attribute__((always_inline)) {
+    sums[at] += product - products[at];
+    products[at] = product;
+  };
   for (int x = 0; x < count; ++x) {
     const int gx = a[x + 1] - a[x - 1] + 2 * (p[x + 1] - p[x - 1]) + b[x + 1] - b[x - 1];
     const int gy = b[x - 1] - a[x - 1] + 2 * (b[x] - a[x]) + b[x + 1] - a[x + 1];
-    xx[x] = gx * gx;
-    xy[x] = gx * gy;
-    yy[x] = gy * gy;
+    replace(x, gx * gx);
+    replace(count + x, gx * gy);
+    replace(2 * count + x, gy * gy);
   }
 }
 
-FBVINS_KERNEL
-void add_row(const std::int32_t* row, int count, std::int32_t* sums) {
-  for (int i = 0; i < count; ++i) sums[i] += row[i];
+/// Of numbers that are not negative. GCC calls a function for the roots of a loop, for the sake of errno.
+FBVINS_INLINE void take_roots(float (&x)[kStep]) {
+  for (int i = 0; i < kStep; i += 4) {
+#if defined(__x86_64__)
+    _mm_storeu_ps(x + i, _mm_sqrt_ps(_mm_loadu_ps(x + i)));
+#elif defined(__aarch64__)
+    vst1q_f32(x + i, vsqrtq_f32(vld1q_f32(x + i)));
+#else
+    for (int k = i; k < i + 4; ++k) x[k] = std::sqrt(x[k]);
+#endif
+  }
 }
 
-FBVINS_KERNEL
-void subtract_row(const std::int32_t* row, int count, std::int32_t* sums) {
-  for (int i = 0; i < count; ++i) sums[i] -= row[i];
-}
-
-/// Smaller eigenvalue of the window-mean structure tensor; column sums start kHalf left of out[0].
+/// Smaller eigenvalue of the window-mean structure tensor; column sums start kHalf left of out[0]. kStep at a time, the last
+/// beyond `count`.
 FBVINS_KERNEL
 void response_row(const std::int32_t* sxx, const std::int32_t* sxy, const std::int32_t* syy, int count, float* out) {
   constexpr float scale = 0.5f / (64.0f * kWindow * kWindow);
-  for (int x = 0; x < count; ++x) {
-    std::int32_t a = 0, b = 0, c = 0;
-    for (int i = 0; i < kWindow; ++i) {
-      a += sxx[x + i];
-      b += sxy[x + i];
-      c += syy[x + i];
+  float trace[kStep], root[kStep];
+  for (int first = 0; first < count; first += kStep) {
+    for (int x = 0; x < kStep; ++x) {
+      std::int32_t a = 0, b = 0, c = 0;
+#pragma GCC unroll 7
+      for (int i = first + x; i < first + x + kWindow; ++i) a += sxx[i], b += sxy[i], c += syy[i];
+      const float fa = static_cast<float>(a), fb = static_cast<float>(b), fc = static_cast<float>(c);
+      const float d = fa - fc;
+      trace[x] = fa + fc;
+      root[x] = d * d + 4.0f * fb * fb;
     }
-    const float fa = static_cast<float>(a), fb = static_cast<float>(b), fc = static_cast<float>(c);
-    const float d = fa - fc;
-    const float q = d * d + 4.0f * fb * fb;
-    out[x] = scale * (fa + fc - __builtin_sqrtf(q));
+    take_roots(root);
+    for (int x = 0; x < kStep; ++x) out[first + x] = scale * (trace[x] - root[x]);
   }
 }
 
@@ -130,15 +148,13 @@ void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int r
   const int rw = width + 2, rh = height + 2;
   const int tw = rw + 2 * kHalf;  // tensors a row
   const auto line = static_cast<std::size_t>(3 * tw);
-  response_.resize(static_cast<std::size_t>(rw) * rh);
-  tensors_.assign(line * (kWindow + 1), 0);
+  response_.resize(static_cast<std::size_t>(rw) * rh + kStep);
+  tensors_.assign(line * (kWindow + 1) + kStep, 0);
   std::int32_t* sums = tensors_.data() + line * kWindow;
   for (int i = 0; i < rh + 2 * kHalf; ++i) {
     // Ring of window rows: the row that leaves the window is zero until the ring is full.
     std::int32_t* slot = tensors_.data() + line * static_cast<std::size_t>(i % kWindow);
-    subtract_row(slot, 3 * tw, sums);
-    structure_row(image.row(y0 - 1 - kHalf + i) + x0 - 1 - kHalf, image.stride, tw, slot, slot + tw, slot + 2 * tw);
-    add_row(slot, 3 * tw, sums);
+    move_window(image.row(y0 - 1 - kHalf + i) + x0 - 1 - kHalf, image.stride, tw, slot, sums);
     if (i >= 2 * kHalf)
       response_row(sums, sums + tw, sums + 2 * tw, rw, response_.data() + static_cast<std::ptrdiff_t>(i - 2 * kHalf) * rw);
   }

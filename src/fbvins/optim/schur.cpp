@@ -4,28 +4,25 @@
 #include <Eigen/LU>
 #include <cstring>
 
-#include "fbvins/core/simd.hpp"
+#include "fbvins/core/lanes.hpp"
 
 namespace fbvins {
 namespace {
 
-using Four = double __attribute__((vector_size(32)));
-using Two = double __attribute__((vector_size(16)));
-
 /// Columns of H that one pass over W V^-1 serves.
 constexpr int kColumns = 3;
 
-/// out -= y w^T in as many rows as lanes and kColumns columns; y has three columns `length` apart.
-template <class Lanes>
+/// out -= y w^T in `Rows` rows and kColumns columns; y has three columns `length` apart.
+template <int Rows>
 FBVINS_INLINE void subtract_rows(const double* y, std::ptrdiff_t length, const double* w, double* out, std::ptrdiff_t ld) {
-  Lanes y0, y1, y2, x;
-  std::memcpy(&y0, y, sizeof(y0));
-  std::memcpy(&y1, y + length, sizeof(y1));
-  std::memcpy(&y2, y + 2 * length, sizeof(y2));
+  Lanes<double, Rows> y0, y1, y2, x;
+  load_lanes(y, y0);
+  load_lanes(y + length, y1);
+  load_lanes(y + 2 * length, y2);
   for (int c = 0; c < kColumns; ++c) {
-    std::memcpy(&x, out + c * ld, sizeof(x));
+    load_lanes(out + c * ld, x);
     x -= y0 * w[3 * c] + y1 * w[3 * c + 1] + y2 * w[3 * c + 2];
-    std::memcpy(out + c * ld, &x, sizeof(x));
+    store_lanes(x, out + c * ld);
   }
 }
 
@@ -42,8 +39,8 @@ FBVINS_KERNEL void subtract_outer_products(double* H, std::ptrdiff_t ld, const i
       for (int j = 0; j < 6; j += kColumns) {
         double* out = H + (offsets[b] + j) * ld + offsets[a];
         const double *of_run = y + 6 * a, *of_columns = w + 18 * b + 3 * j;
-        for (int i = 0; i < whole; i += 4) subtract_rows<Four>(of_run + i, length, of_columns, out + i, ld);
-        if (whole < n) subtract_rows<Two>(of_run + whole, length, of_columns, out + whole, ld);
+        for (int i = 0; i < whole; i += 4) subtract_rows<4>(of_run + i, length, of_columns, out + i, ld);
+        if (whole < n) subtract_rows<2>(of_run + whole, length, of_columns, out + whole, ld);
       }
       a = end;
     }
