@@ -19,6 +19,7 @@
 #include "fbvins/bags/bag_survey.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/io/calibration_doubts.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/known_file.hpp"
 
@@ -160,6 +161,7 @@ bool has_images(const std::string& path) {
 std::optional<KnownFile> file_of(const std::string& path) {
   const Result<StereoRig> rig = calibration_in(path);
   if (rig) {
+    for (const std::string& doubt : calibration_doubts(*rig)) warn(doubt);
     std::string what = fmt::format("a calibration of {} camera{}", rig->camera_count(), rig->camera_count() == 1 ? "" : "s");
     for (int i = 0; i < rig->camera_count(); ++i) what += fmt::format("; camera {}: {}", i, lens_of(rig->camera(i)));
     if (rig->has_right()) what += fmt::format("; baseline {:.4f} m", rig->T_C1C0().p.norm());

@@ -147,7 +147,12 @@ std::string label_of(const Health& health) {
   return fmt::format("{}/{}", to_string(health.state), to_string(health.reason));
 }
 
-double time_offset_found_s(const RunRecord& record) { return record.odometry.empty() ? 0 : record.odometry.back().time_offset_s; }
+double time_offset_found_s(const RunRecord& record) {
+  const auto& odometry = record.odometry;
+  const auto poses = std::ranges::count_if(odometry, [](const Odometry& o) { return o.health.has_pose(); });
+  const auto good = std::ranges::count_if(odometry, [](const Odometry& o) { return o.health.state == HealthState::good; });
+  return good == 0 || 2 * good < poses ? 0 : odometry.back().time_offset_s;
+}
 
 Trajectory<W> truth_of(const Dataset& data, double found_s) {
   const Duration offset = Duration::from_seconds(data.rig().time_offset_s + found_s);

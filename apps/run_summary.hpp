@@ -51,7 +51,7 @@ struct RunSummary {
 std::string label_of(const Health& health);
 /// Of this process so far.
 double peak_memory_mb();
-/// Besides that of the calibration, at the end.
+/// Besides that of the calibration, at the end; 0 where most poses are not good, as nothing was found then.
 double time_offset_found_s(const RunRecord& record);
 /// The recording's ground truth as a trajectory; empty where there is none. It is on the IMU's clock, poses are on the images':
 /// the calibration's time offset, and what the run found besides, lie between them.

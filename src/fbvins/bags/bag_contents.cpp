@@ -10,6 +10,7 @@
 #include <deque>
 #include <utility>
 
+#include "fbvins/bags/bag_stamps.hpp"
 #include "fbvins/bags/foreign_calibration.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/bags/topic_choice.hpp"
@@ -47,6 +48,7 @@ void take_imu(const BagMessage& message, const BagTopic& about, std::optional<Ti
   }
   if (recorded) sample->t = *recorded;
   topic.samples.push_back(*sample);
+  topic.recorded.push_back(message.log_time);
 }
 
 void take_aiding(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, AidingTopic& topic) {
@@ -55,6 +57,7 @@ void take_aiding(const BagMessage& message, const BagTopic& about, std::optional
   if (recorded) stamp_of(read->reading) = *recorded;
   if (topic.readings.empty()) topic.frame = read->frame;
   topic.readings.push_back(std::move(read->reading));
+  topic.recorded.push_back(message.log_time);
 }
 
 void take_image(const BagMessage& message, const BagTopic& about, std::optional<Time> recorded, ImageTopic& topic) {
@@ -66,8 +69,9 @@ void take_image(const BagMessage& message, const BagTopic& about, std::optional<
     topic.frame = in.frame();
   }
   const std::optional<Time> t = stamp_of(message.data, about.encoding);
-  if (t) topic.rows.push_back({recorded.value_or(*t), place_name(message.place)});
-  else ++topic.malformed;
+  if (!t) return void(++topic.malformed);
+  topic.rows.push_back({recorded.value_or(*t), place_name(message.place)});
+  topic.recorded.push_back(message.log_time);
 }
 
 void take_camera(const BagMessage& message, const BagTopic& about, BagContents& out) {
@@ -200,6 +204,7 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
       if (const auto point = pose_of(message->data, about.encoding, about.type)) out.ground_truth.push_back(*point);
     }
   }
+  sort_by_recording(out);
   out.strangers = bag.strangers();
   return out;
 }

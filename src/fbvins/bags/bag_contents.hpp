@@ -18,13 +18,15 @@
 namespace fbvins {
 
 struct ImuTopic {
-  std::vector<ImuSample> samples;  ///< in recorded order
+  std::vector<ImuSample> samples;   ///< in recorded order
+  std::vector<Time> recorded = {};  ///< when each was
   std::string frame;
   int malformed = 0;
 };
 
 struct ImageTopic {
   std::vector<ImageRow> rows;  ///< in recorded order; `file` is the message's place
+  std::vector<Time> recorded = {};
   std::string frame;
   bool compressed = false;
   Encoding encoding = Encoding::ros1;
@@ -33,6 +35,7 @@ struct ImageTopic {
 
 struct AidingTopic {
   std::vector<AidingSample> readings;  ///< in recorded order, as if the sensor's axes were the body's
+  std::vector<Time> recorded = {};
   std::string frame;
   int malformed = 0;
 };

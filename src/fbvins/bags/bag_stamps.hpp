@@ -14,6 +14,10 @@
 
 namespace fbvins {
 
+/// Messages that were written in another order than they were recorded in, put in that order. A clock that was set back while
+/// recording looks the same, but for stamps that come close to each other in the order of times: then nothing is done.
+void sort_by_recording(BagContents& contents);
+
 /// Header stamps of zero, which a driver that does not stamp leaves: an error where all are, else they are left out, and said.
 Result<void> leave_out_zero_stamps(BagContents& contents, const ChosenTopics& topics, std::vector<std::string>& warnings);
 

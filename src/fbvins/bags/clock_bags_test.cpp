@@ -71,6 +71,16 @@ TEST(ClockBags, AClockThatIsSetBackBeginsANewPart) {
   EXPECT_TRUE(all.in_order);
 }
 
+TEST(ClockBags, PartsThatWereWrittenInAnotherOrderAreReadInThatOfTheirRecording) {
+  const auto stamp = [](std::int64_t ms) { return (100'000 + (ms < 1000 ? ms : ms < 2000 ? ms + 2000 : ms - 1000)) * kMs; };
+  const Read all = read_back(bag_with("parts", stamp, stamp), "clock");
+  EXPECT_EQ(all.frames, 80);
+  EXPECT_EQ(all.readings, 800);
+  EXPECT_EQ(all.marked, 0);
+  EXPECT_EQ(all.said, 0);
+  EXPECT_TRUE(all.in_order);
+}
+
 TEST(ClockBags, ADeviceThatStartsAgain) {
   const auto stamp = [](std::int64_t ms) { return (ms >= 2000 ? 50 + ms - 2000 : 5'000'000 + ms) * kMs; };
   const Read all = read_back(bag_with("restart", stamp, stamp), "or the device started again");

@@ -84,6 +84,14 @@ TEST(Checkup, NamesExchangedSensors) {
   EXPECT_NE(findings[0].advice.find("exchanged"), std::string::npos);
 }
 
+TEST(Checkup, DegreesThatLookLikeGravityAreNotExchanged) {
+  auto samples = readings();
+  for (ImuSample& sample : samples) sample.gyro_radps = Vec3(9.8, 0, 0), sample.accel_mps2 /= kGravity_mps2;
+  const auto findings = check_reading_units(samples);
+  EXPECT_TRUE(says(findings, FindingKind::gyro_units));
+  for (const Finding& finding : findings) EXPECT_EQ(finding.advice.find("exchanged"), std::string::npos) << finding.advice;
+}
+
 TEST(Checkup, UnitsTooCloseToBeDistinguishedAreBothNamed) {
   const auto advice = [](double factor) {
     auto samples = readings();

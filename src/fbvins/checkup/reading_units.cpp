@@ -73,12 +73,14 @@ void check_accelerometer(std::span<const ImuSample> samples, std::vector<Finding
   findings.push_back(std::move(finding));
 }
 
-/// Whether gyroscope and accelerometer are.
+/// Whether gyroscope and accelerometer are. A gyroscope in degrees a second may read 9.8 on average, too, but beside an
+/// accelerometer in g that reads a steady one.
 bool exchanged(std::span<const ImuSample> samples) {
   std::vector<ImuSample> other(samples.begin(), samples.end());
   for (ImuSample& sample : other) std::swap(sample.gyro_radps, sample.accel_mps2);
   const GravitySeen seen = gravity_seen(samples), there = gravity_seen(other);
-  return there.sigma_mps2 > 0 && near_to(there.norm_mps2, kGravity_mps2) && seen.norm_mps2 < kNoGravity * kGravity_mps2;
+  const bool in_g = std::abs(seen.norm_mps2 - 1) < kSameUnit && seen.sigma_mps2 < kSameUnit;
+  return !in_g && there.sigma_mps2 > 0 && near_to(there.norm_mps2, kGravity_mps2) && seen.norm_mps2 < kNoGravity * kGravity_mps2;
 }
 
 Finding exchanged_finding() {

@@ -83,13 +83,23 @@ double largest_angle(const std::vector<std::vector<double>>& rows) {
   return out;
 }
 
-/// Order of the quaternion by the names of the columns; none where they do not say.
+/// Order of the quaternion by the names of the columns, four that differ by their last letter; none where they do not say.
 std::optional<bool> w_first_by(std::string_view header) {
-  std::string text(header);
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const auto& [w, x] :
-       {std::pair("qw", "qx"), {"q_w", "q_x"}, {"q_rs_w", "q_rs_x"}, {"orientation.w", "orientation.x"}, {"rot_w", "rot_x"}})
-    if (text.find(w) != std::string::npos && text.find(x) != std::string::npos) return text.find(w) < text.find(x);
+  std::vector<std::string> names(1);
+  for (const char c : header) {
+    if (std::string_view(", ;\t#").find(c) != std::string_view::npos) {
+      if (!names.back().empty() && names.back()[0] != '[') names.emplace_back();
+      names.back().clear();
+    } else {
+      names.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  for (std::size_t i = 0; i + 3 < names.size(); ++i) {
+    std::string letters;
+    for (std::size_t k = i; k < i + 4 && names[k].size() > 1; ++k)
+      if (names[k].substr(0, names[k].size() - 1) == names[i].substr(0, names[i].size() - 1)) letters += names[k].back();
+    if (letters == "wxyz" || letters == "xyzw") return letters == "wxyz";
+  }
   return std::nullopt;
 }
 

@@ -18,10 +18,10 @@
 #include "fbvins/core/sample_period.hpp"
 #include "fbvins/imu/reading_judge.hpp"
 #include "fbvins/live/clock_guard.hpp"
-#include "fbvins/pipeline/frozen_camera.hpp"
 #include "fbvins/live/imu_order.hpp"
 #include "fbvins/live/live_event.hpp"
 #include "fbvins/live/source.hpp"
+#include "fbvins/pipeline/frozen_camera.hpp"
 
 namespace fbvins {
 

@@ -12,9 +12,9 @@
 #include <mutex>
 #include <vector>
 
-#include "fbvins/pipeline/frozen_camera.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/source.hpp"
+#include "fbvins/pipeline/frozen_camera.hpp"
 
 namespace fbvins {
 
