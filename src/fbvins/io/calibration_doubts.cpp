@@ -34,8 +34,8 @@ void doubt_times(const StereoRig& rig, int number, std::vector<std::string>& out
                     number, times.line_delay_s));
 }
 
-/// A focal length from that of the widest lens to a telescope's, in widths of the image; pixels that are a fifth wider than high; a
-/// centre that far outside, in sizes of the image; a camera that far from the IMU.
+/// A focal length from that of the widest lens to a telescope's, in widths of the image; pixels that are a fifth wider than high;
+/// a centre that far outside, in sizes of the image; a camera that far from the IMU.
 constexpr double kShortest = 0.05, kLongest = 20, kLargestAspect = 1.2, kOutside = 0.25, kFarthest_m = 5;
 
 void doubt_lens(const StereoRig& rig, int number, std::vector<std::string>& out) {
