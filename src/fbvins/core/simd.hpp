@@ -23,3 +23,12 @@
 
 /// For helpers of kernels: without inlining they would be compiled for the baseline only.
 #define FBVINS_INLINE inline __attribute__((always_inline))
+
+/// Whether kernels that are written for both widths of registers take the wider one.
+FBVINS_INLINE bool has_wide_registers() {
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__)
+  return __builtin_cpu_supports("avx512f");
+#else
+  return false;
+#endif
+}

@@ -19,9 +19,9 @@ using F16 = Lanes<float, kLanes>;
 using U8x16 = std::uint8_t __attribute__((vector_size(16)));
 
 /// Bytes to lanes. Sixteen bytes are read, however many lanes there are.
-template <int N>
-FBVINS_INLINE void load_lanes(const std::uint8_t* p, Lanes<float, N>& out) {
-  constexpr int kInPart = Lanes<float, N>::kInPart;
+template <int N, int B>
+FBVINS_INLINE void load_lanes(const std::uint8_t* p, Lanes<float, N, B>& out) {
+  constexpr int kInPart = Lanes<float, N, B>::kInPart;
 #if defined(__aarch64__)
   const uint8x16_t bytes = vld1q_u8(p);
 #pragma GCC unroll 4
@@ -39,19 +39,19 @@ FBVINS_INLINE void load_lanes(const std::uint8_t* p, Lanes<float, N>& out) {
   const U16x16 wide = __builtin_convertvector(bytes, U16x16);
 #pragma GCC unroll 4
   for (int i = 0; i < N / kInPart; ++i) {
-    typename Lanes<std::uint16_t, kInPart>::Part part;
+    typename Lanes<std::uint16_t, kInPart, B>::Part part;
     std::memcpy(&part, reinterpret_cast<const char*>(&wide) + i * sizeof(part), sizeof(part));
-    out.part[i] = __builtin_convertvector(__builtin_convertvector(part, typename Lanes<std::int32_t, kInPart>::Part),
-                                          typename Lanes<float, N>::Part);
+    out.part[i] = __builtin_convertvector(__builtin_convertvector(part, typename Lanes<std::int32_t, kInPart, B>::Part),
+                                          typename Lanes<float, N, B>::Part);
   }
 #endif
 }
 
 /// Sum of the lanes, pairwise: the upper half is added to the lower one, and so on.
-template <int N>
-FBVINS_INLINE float sum_lanes(const Lanes<float, N>& v) {
+template <int N, int B>
+FBVINS_INLINE float sum_lanes(const Lanes<float, N, B>& v) {
   using Four = float __attribute__((vector_size(16)));
-  constexpr int kFours = N / 4, kInPart = Lanes<float, N>::kInPart / 4;
+  constexpr int kFours = N / 4, kInPart = Lanes<float, N, B>::kInPart / 4;
   Four s[kFours];
 #pragma GCC unroll 4
   for (int i = 0; i < kFours; ++i)
