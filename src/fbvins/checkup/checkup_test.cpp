@@ -86,7 +86,10 @@ TEST(Checkup, NamesExchangedSensors) {
 
 TEST(Checkup, DegreesThatLookLikeGravityAreNotExchanged) {
   auto samples = readings();
-  for (ImuSample& sample : samples) sample.gyro_radps = Vec3(9.8, 0, 0), sample.accel_mps2 /= kGravity_mps2;
+  for (ImuSample& sample : samples) {
+    sample.gyro_radps = Vec3(9.8, 0, 0);
+    sample.accel_mps2 = Vec3(0, 0, 1 + 0.01 * std::sin(3 * sample.t.seconds()));
+  }
   const auto findings = check_reading_units(samples);
   EXPECT_TRUE(says(findings, FindingKind::gyro_units));
   for (const Finding& finding : findings) EXPECT_EQ(finding.advice.find("exchanged"), std::string::npos) << finding.advice;

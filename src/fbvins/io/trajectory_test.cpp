@@ -203,7 +203,7 @@ TEST(Trajectory, OrderOfTheQuaternionIsSaidWhereItIsAssumed) {
   expect_last(three(kSeconds, kWFirst), "stamps in seconds", *parse_trajectory_format("s,wxyz"));
   expect_last("t,x,y,z,qw,qx,qy,qz\n" + three(kSeconds, kWFirst), "stamps in seconds");
   for (const char* names : {"q_WS_x, q_WS_y, q_WS_z, q_WS_w", "ox,oy,oz,ow", "rot.x [], rot.y [], rot.z [], rot.w []"})
-    expect_last(std::string("t, p_x, p_y, p_z, ") + names + "\n" + three(kSeconds, commas),
+    expect_last(std::string("t, p_WS_x, p_WS_y, p_WS_z, ") + names + "\n" + three(kSeconds, commas),
                 "stamps in seconds, quaternions x y z w");
   EXPECT_EQ(parse_trajectory_format("zyxw").error().message, "'zyxw' is neither ns, us, ms, s, wxyz nor xyzw");
 }

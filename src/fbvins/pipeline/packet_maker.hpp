@@ -39,7 +39,7 @@ class PacketMaker {
   bool is_ready(bool flush) const;
 
   ImuHistory imu_;
-  RepeatedImages repeated_;
+  RepeatedImageFilter repeated_;
   Duration given_, time_offset_;
   std::deque<StereoFrame> waiting_;
   std::vector<Anchor> anchors_;

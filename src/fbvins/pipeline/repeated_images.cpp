@@ -24,7 +24,7 @@ bool is_of_one_grey(const ImageView& image) {
 
 }  // namespace
 
-bool RepeatedImages::is_repeated(OfCamera& camera, const Image& image, const Quat& R_B0B, Time t) {
+bool RepeatedImageFilter::is_repeated(OfCamera& camera, const Image& image, const Quat& R_B0B, Time t) {
   const std::uint64_t now = image_fingerprint(image.view());
   const auto same = std::find_if(camera.seen.rbegin(), camera.seen.rend(), [&](const Seen& s) { return s.fingerprint == now; });
   if (same != camera.seen.rend() && !is_of_one_grey(image.view())) {
@@ -36,7 +36,7 @@ bool RepeatedImages::is_repeated(OfCamera& camera, const Image& image, const Qua
   return false;
 }
 
-bool RepeatedImages::take_out(StereoFrame& frame, const ImuSegment& since) {
+bool RepeatedImageFilter::take_out(StereoFrame& frame, const ImuSegment& since) {
   if (since.empty())
     for (OfCamera& camera : cameras_) camera.seen.clear();  // nobody knows by how much it has turned
   const Quat R_B0B = since.empty() ? R_B0B_ : Quat(R_B0B_ * integrate_gyro(since, Vec3::Zero()));

@@ -16,7 +16,7 @@
 
 namespace fbvins {
 
-class RepeatedImages {
+class RepeatedImageFilter {
  public:
   /// Takes repeated images out of the frame. `since`: readings from the last frame for which this was true, empty without.
   /// False if the frame had images and has none any more.

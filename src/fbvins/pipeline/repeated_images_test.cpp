@@ -31,8 +31,8 @@ ImuSegment turning(int k, double rate_radps, int frames = 1) {
   return out;
 }
 
-TEST(RepeatedImages, OneThatComesAgainIsTakenOutWhereTheVehicleTurns) {
-  RepeatedImages repeated;
+TEST(RepeatedImageFilter, OneThatComesAgainIsTakenOutWhereTheVehicleTurns) {
+  RepeatedImageFilter repeated;
   StereoFrame first = frame(0, 1, 101), again = frame(1, 1, 101), right = frame(2, 2, 101), next = frame(3, 3, 103);
   EXPECT_TRUE(repeated.take_out(first, {}));
   EXPECT_FALSE(repeated.take_out(again, turning(1, 0.4))) << "no image is left";
@@ -43,8 +43,8 @@ TEST(RepeatedImages, OneThatComesAgainIsTakenOutWhereTheVehicleTurns) {
   EXPECT_EQ(repeated.count(), 3);
 }
 
-TEST(RepeatedImages, EqualImagesOfAVehicleAtRestAreKeptUntilTheCameraIsKnownToRepeat) {
-  RepeatedImages repeated;
+TEST(RepeatedImageFilter, EqualImagesOfAVehicleAtRestAreKeptUntilTheCameraIsKnownToRepeat) {
+  RepeatedImageFilter repeated;
   for (int k = 0; k < 5; ++k) {
     StereoFrame still = frame(k, 1, 101);
     EXPECT_TRUE(repeated.take_out(still, k == 0 ? ImuSegment{} : turning(k, 0.04))) << "a bias of the gyroscope is no turn";
@@ -55,8 +55,8 @@ TEST(RepeatedImages, EqualImagesOfAVehicleAtRestAreKeptUntilTheCameraIsKnownToRe
   EXPECT_FALSE(repeated.take_out(at_rest, turning(6, 0, 2)));
 }
 
-TEST(RepeatedImages, APathThatReturnsShowsTheSameImage) {
-  RepeatedImages repeated;
+TEST(RepeatedImageFilter, APathThatReturnsShowsTheSameImage) {
+  RepeatedImageFilter repeated;
   StereoFrame there = frame(0, 1, 101), away = frame(1, 2, 102), back = frame(2, 1, 101), in_turns = frame(3, 2, 102);
   EXPECT_TRUE(repeated.take_out(there, {}));
   EXPECT_TRUE(repeated.take_out(away, turning(1, 0.5)));
@@ -65,8 +65,8 @@ TEST(RepeatedImages, APathThatReturnsShowsTheSameImage) {
   EXPECT_FALSE(repeated.take_out(in_turns, turning(3, 1.5))) << "it was taken elsewhere";
 }
 
-TEST(RepeatedImages, BlackImagesAreKept) {
-  RepeatedImages repeated;
+TEST(RepeatedImageFilter, BlackImagesAreKept) {
+  RepeatedImageFilter repeated;
   for (int k = 0; k < 3; ++k) {
     StereoFrame dark{Time{} + Duration::from_seconds(1 + kPeriod_s * k), {std::make_shared<const Image>(64, 48)}};
     EXPECT_TRUE(repeated.take_out(dark, k == 0 ? ImuSegment{} : turning(k, 2)));
