@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "fbvins/core/hypotenuse.hpp"
+
 namespace {
 
 /// FNV-1a hash of the bits of the added numbers.
@@ -112,6 +114,16 @@ void functions() {
   sum.print("functions");
 }
 
+void hypotenuses() {
+  Numbers numbers;
+  Sum sum;
+  for (int i = 0; i < 100000; ++i) {
+    const double x = numbers.next(), y = numbers.next();
+    sum.add(fbvins::hypotenuse(x, y)), sum.add(fbvins::hypotenuse(1, x * y));
+  }
+  sum.print("hypotenuses");
+}
+
 }  // namespace
 
 int main() {
@@ -125,4 +137,5 @@ int main() {
   fixed<float, 3>("float_3");
   rotations();
   functions();
+  hypotenuses();
 }

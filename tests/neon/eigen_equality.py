@@ -43,6 +43,7 @@ def main(source, native, sysroot=None):
     source = pathlib.Path(source).resolve()
     bits, header = source / "tests/neon/eigen_bits.cpp", source / "src/fbvins/core/eigen_as_on_x86_64.hpp"
     with tempfile.TemporaryDirectory() as folder:
+        OPTIONS.append(f"-I{source / 'src'}")
         subprocess.run([native, *OPTIONS, "-isystem/usr/include/eigen3", bits, "-o", f"{folder}/native"], check=True)
         arm = [cross, *OPTIONS, *includes(folder, sysroot), bits, "-o"]
         subprocess.run([*arm, f"{folder}/arm", "-include", header], check=True)

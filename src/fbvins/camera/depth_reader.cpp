@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
@@ -63,7 +64,7 @@ std::optional<double> depth_m(const DepthSensor& sensor, const DepthImage& image
   return depth_m < sensor.nearest_m || depth_m > sensor.farthest_m ? std::nullopt : std::optional(depth_m);
 }
 
-double sigma_of(const DepthSensor& sensor, double rho) { return std::hypot(sensor.noise_at_1m_m, kRounding_m * rho * rho); }
+double sigma_of(const DepthSensor& sensor, double rho) { return hypotenuse(sensor.noise_at_1m_m, kRounding_m * rho * rho); }
 
 /// A plane through the depths of a window.
 struct Fit {

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -45,7 +47,7 @@ double ignored_px(const Camera& camera, const std::vector<double>& k) {
       const Vec2 plane((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
       const Vec2 prism(k[8] * s + k[9] * s * s, k[10] * s + k[11] * s * s);
       const Vec2 moved = Vec2((tilt * (plane + prism).homogeneous()).hnormalized()) - plane;
-      most = std::max(most, std::hypot(fx * moved.x(), fy * moved.y()));
+      most = std::max(most, hypotenuse(fx * moved.x(), fy * moved.y()));
     }
   return most;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/height_factor.hpp"
 #include "fbvins/estimator/window_equations.hpp"
 
@@ -54,7 +55,7 @@ std::optional<BarometerMaker::Height> BarometerMaker::height_of(const NewFrame& 
   pressure_pa /= n;
   if (!reference_pa_) reference_pa_ = pressure_pa;
   const double noise_m = kScaleHeight_m / pressure_pa * std::sqrt(variance) / n;
-  Height out{pressure_height_m(pressure_pa, *reference_pa_), 0, std::hypot(noise_m, kGust_m), f.frame.t};
+  Height out{pressure_height_m(pressure_pa, *reference_pa_), 0, hypotenuse(noise_m, kGust_m), f.frame.t};
   out.level_m = f.window.tilt().gravity_G(-1).dot(f.frame.state.T_FB.p) - out.above_m;
   return out;
 }
@@ -62,11 +63,11 @@ std::optional<BarometerMaker::Height> BarometerMaker::height_of(const NewFrame& 
 bool BarometerMaker::fits(const Height& height, const SlidingWindow& window) const {
   const double drift_m = drift_m_rts_ * std::sqrt((height.t - level_->seen).seconds());
   const double off_m = height.level_m - window.own(level_->number)->value(0);
-  return std::abs(off_m) < std::max(kJump_m, kJump_sigma * std::hypot(height.sigma_m, drift_m));
+  return std::abs(off_m) < std::max(kJump_m, kJump_sigma * hypotenuse(height.sigma_m, drift_m));
 }
 
 bool BarometerMaker::stays(const Height& height) {
-  const double apart_m = std::max(kJump_m, kJump_sigma * std::hypot(height.sigma_m, height.sigma_m));
+  const double apart_m = std::max(kJump_m, kJump_sigma * hypotenuse(height.sigma_m, height.sigma_m));
   const auto same = [&](const Height& other) { return std::abs(other.level_m - height.level_m) < apart_m; };
   if (!std::ranges::all_of(apart_, same)) apart_.clear();
   apart_.push_back(height);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/core/median.hpp"
 #include "fbvins/estimator/camera_residuals.hpp"
 #include "fbvins/estimator/integrity_thresholds.hpp"
@@ -120,7 +121,7 @@ ConsistencyMonitor::Verdict ConsistencyMonitor::check(const std::vector<Landmark
   const ResidualMedians at_prediction = camera_residuals(observations, calibration, predicted, v_B);
   const double room = std::clamp(usual_shift_ / kUsualShift, 1.0, kMostRoom);
   const double patience = room * (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s) *
-                          std::hypot(1.0, kSpread_sigma * spread(predicted.q, v_B, at_prediction.focal, dt));
+                          hypotenuse(1.0, kSpread_sigma * spread(predicted.q, v_B, at_prediction.focal, dt));
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   learn(at_prediction.shift, patience / room, dt);
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/window_equations.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -57,7 +58,7 @@ double HeightFactor::linearise(const WindowProblem& w, NormalEquations& out) con
 
 std::shared_ptr<const Factor> HeightFactor::without(const DroppedFrame& d) const {
   return std::make_shared<const HeightFactor>(d.successor, level_, d.T_successor_dropped * point_B_,
-                                              std::hypot(sigma_m_, kHandedOn_m), above_m_);
+                                              hypotenuse(sigma_m_, kHandedOn_m), above_m_);
 }
 
 }  // namespace fbvins

@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/core/median.hpp"
 #include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/geometry/so3.hpp"
@@ -102,7 +103,7 @@ std::vector<FramePair> pairs_of(const std::vector<Track>& tracks, std::size_t fr
         return std::find_if(track.begin(), track.end(), [&](const Sight& s) { return s.frame == frame; });
       };
       const auto a = seen(pair.from), b = seen(pair.to);
-      if (a != track.end() && b != track.end()) pair.planes.push_back({a->ray_B, b->ray_B, std::hypot(a->sigma, b->sigma)});
+      if (a != track.end() && b != track.end()) pair.planes.push_back({a->ray_B, b->ray_B, hypotenuse(a->sigma, b->sigma)});
     }
   std::erase_if(pairs, [](const FramePair& p) { return p.planes.size() < kFewestInPair; });
   return pairs;

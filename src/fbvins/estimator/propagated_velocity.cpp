@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/integrity_thresholds.hpp"
 #include "fbvins/imu/propagation.hpp"
 
@@ -29,8 +30,8 @@ bool PropagatedVelocity::Carried::joins(const std::vector<TrackId>& seen) const 
 
 double PropagatedVelocity::Carried::sigma_mps() const {
   const double t = seconds, g = known.gravity_G.norm();
-  return std::hypot(std::hypot(known.velocity_sigma_mps, g * known.tilt_sigma_rad * t),
-                    std::hypot(g * known.gyro_bias_sigma_radps * t * t / 2, known.accel_bias_sigma_mps2 * t), kAccel_mps2 * t);
+  return std::hypot(hypotenuse(known.velocity_sigma_mps, g * known.tilt_sigma_rad * t),
+                    hypotenuse(g * known.gyro_bias_sigma_radps * t * t / 2, known.accel_bias_sigma_mps2 * t), kAccel_mps2 * t);
 }
 
 /// What the pose has moved by is still told.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/floor_scale.hpp"
 
 namespace fbvins {
@@ -53,7 +54,7 @@ std::optional<RangeMaker::Hit> RangeMaker::hit_of(const NewFrame& f) {
 
 double RangeMaker::gate_m(const Hit& hit, const Floor& floor) const {
   const double drift_m = std::min(kMostDrift_m, kDrift_mps * (hit.t - floor.seen).seconds());
-  return std::max(kStep_m, kStep_sigma * std::hypot(hit.sigma_m, floor_sigma_m_)) + drift_m;
+  return std::max(kStep_m, kStep_sigma * hypotenuse(hit.sigma_m, floor_sigma_m_)) + drift_m;
 }
 
 /// The nearest one, if the hit lies on it.
@@ -105,7 +106,7 @@ std::vector<std::shared_ptr<const Factor>> RangeMaker::make(const NewFrame& f) {
   floor->seen = hit->t;
   std::vector<std::shared_ptr<const Factor>> out;
   out.push_back(
-      std::make_shared<const HeightFactor>(f.frame.id, floor->number, hit->p_B, std::hypot(hit->sigma_m, floor_sigma_m_)));
+      std::make_shared<const HeightFactor>(f.frame.id, floor->number, hit->p_B, hypotenuse(hit->sigma_m, floor_sigma_m_)));
   if (images_show_scale_ || f.of_start || !is_lowest(*floor, f.window)) return out;
   FrameId newest;
   for (const Frame& frame : f.window.frames())

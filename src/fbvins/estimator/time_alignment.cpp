@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/imu/stamp_noise.hpp"
 
@@ -36,7 +37,7 @@ constexpr double kKept_s = 0.005;
 /// Beyond the rig's. More than can be found is not used.
 std::optional<TimeOffsetEstimate> correction_of(const std::optional<TimeOffsetEstimate>& kept, const StereoRig& rig) {
   if (!kept) return kept;
-  const TimeOffsetEstimate beyond{kept->s - rig.time_offset_s, std::hypot(kept->sigma_s, kKept_s)};
+  const TimeOffsetEstimate beyond{kept->s - rig.time_offset_s, hypotenuse(kept->sigma_s, kKept_s)};
   if (std::abs(beyond.s) > GyroAlignment::kLargestOffset_s) return std::nullopt;
   return beyond;
 }
@@ -116,7 +117,7 @@ double TimeAlignment::off_sigmas(const Vec3& gyro_bias_radps, const Mat3& covari
 
 double TimeAlignment::stamp_sigma_s() const {
   const double jitter_s = std::sqrt(std::max(0.0, jitter_s_ * jitter_s_ - kUnseenStampNoise_s * kUnseenStampNoise_s));
-  return std::hypot(jitter_s, settling() ? std::max(0.002, std::abs((found_ - correction_).seconds())) : 0.0);
+  return hypotenuse(jitter_s, settling() ? std::max(0.002, std::abs((found_ - correction_).seconds())) : 0.0);
 }
 
 }  // namespace fbvins

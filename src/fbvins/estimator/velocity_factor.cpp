@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/window_equations.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -110,7 +111,7 @@ double VelocityFactor::linearise(const WindowProblem& w, NormalEquations& out) c
 std::shared_ptr<const Factor> VelocityFactor::without(const DroppedFrame& d) const {
   VelocityAtFrame next = measured_;
   next.reading.v_mps += next.reading.q_BS.conjugate() * (d.v_successor_B - d.v_dropped_B);
-  next.reading.sigma_mps = next.reading.sigma_mps.unaryExpr([](double sigma) { return std::hypot(sigma, kHandedOn_mps); });
+  next.reading.sigma_mps = next.reading.sigma_mps.unaryExpr([](double sigma) { return hypotenuse(sigma, kHandedOn_mps); });
   return std::make_shared<const VelocityFactor>(d.successor, next);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/geometry/ldlt.hpp"
 
 namespace fbvins {
@@ -128,7 +129,7 @@ void GyroAlignment::add_pair(const View& a, const View& b) {
   for (const Sight& seen : b.sights) {
     while (s != a.sights.end() && s->id < seen.id) ++s;
     if (s == a.sights.end()) break;
-    if (s->id == seen.id) tracks.push_back({s->ray_B, seen.ray_B, std::hypot(s->sigma, seen.sigma), s->rows, seen.rows});
+    if (s->id == seen.id) tracks.push_back({s->ray_B, seen.ray_B, hypotenuse(s->sigma, seen.sigma), s->rows, seen.rows});
   }
   if (tracks.size() < kFewestTracks) return;
   pairs_.push_back({a.t, b.t, spread_over(tracks, kMostTracks)});

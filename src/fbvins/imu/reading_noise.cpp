@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -33,7 +35,7 @@ constexpr double kRounding = 1e-9;  ///< of readings whose correction is undone
 
 /// Factor on the noise of readings that differ from one another by `measured` times that noise.
 double with_vibration(double measured, double share) {
-  return std::hypot(std::min(1.0, kHidden * measured), share * std::sqrt(std::max(0.0, measured * measured - 1)));
+  return hypotenuse(std::min(1.0, kHidden * measured), share * std::sqrt(std::max(0.0, measured * measured - 1)));
 }
 
 /// What the sensor gave before its axes were corrected: an axis at the end of its range is one of the sensor's.
@@ -111,7 +113,7 @@ ImuNoiseScale ReadingNoise::of(const ImuSegment& segment) {
   const double usual_gyro = std::max(kUsualGyro_radps, kUsualNoise * gyro_sigma);
   const double usual_accel = std::max(kUsualAccel_mps2, kUsualNoise * accel_sigma);
   out = {with_vibration(gyro_radps_ / gyro_sigma, kGyroShare), with_vibration(accel_mps2_ / accel_sigma, kAccelShare)};
-  out.accel = std::hypot(out.accel, axes_ * changes_.sigma() * std::sqrt(kMotion_s) / assumed_.accel_noise_density_mps2_rthz);
+  out.accel = hypotenuse(out.accel, axes_ * changes_.sigma() * std::sqrt(kMotion_s) / assumed_.accel_noise_density_mps2_rthz);
   // What one reading contributes to the motion, as noise of them all.
   const double root_readings = std::sqrt(static_cast<double>(segment.samples.size()));
   if (worst_gyro_radps_ > kOutlier * std::max(usual_gyro, gyro_radps_))

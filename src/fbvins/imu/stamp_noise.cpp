@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -41,8 +42,8 @@ void add_stamp_noise(ImuSegment& imu, const ImuNoise& noise, double stamp_sigma_
   if (imu.empty() || sigma_s == 0) return;
   const double dt = (imu.samples.back().t - imu.samples.front().t).seconds();
   const double turn = sigma_s * rate_radps.norm(), shift = sigma_s * velocity_mps.norm();
-  imu.noise.gyro = std::hypot(imu.noise.gyro, turn / (noise.gyro_noise_density_radps_rthz * std::sqrt(dt)));
-  imu.noise.accel = std::hypot(imu.noise.accel, shift / (noise.accel_noise_density_mps2_rthz * std::sqrt(dt * dt * dt / 3)));
+  imu.noise.gyro = hypotenuse(imu.noise.gyro, turn / (noise.gyro_noise_density_radps_rthz * std::sqrt(dt)));
+  imu.noise.accel = hypotenuse(imu.noise.accel, shift / (noise.accel_noise_density_mps2_rthz * std::sqrt(dt * dt * dt / 3)));
 }
 
 }  // namespace fbvins
