@@ -2,10 +2,7 @@
 // Options of the estimator, with defaults and units.
 #pragma once
 
-#include <cmath>
-
 #include "fbvins/core/options.hpp"
-#include "fbvins/types/imu.hpp"
 
 namespace fbvins {
 
@@ -117,17 +114,6 @@ struct EstimatorOptions {
   double max_speed_mps = 30;
   double max_step_m = 0.0015;
   double max_pending_m = 0.1;
-
-  /// The noise that readings are weighted with where nothing vibrates (ReadingNoise adds that), from the calibrated one.
-  ImuNoise assumed(ImuNoise noise) const {
-    noise.gyro_noise_density_radps_rthz =
-        std::hypot(gyro_noise_scale * noise.gyro_noise_density_radps_rthz, gyro_unmodelled_radps_rthz);
-    noise.accel_noise_density_mps2_rthz =
-        std::hypot(accel_noise_scale * noise.accel_noise_density_mps2_rthz, accel_unmodelled_mps2_rthz);
-    noise.gyro_random_walk_radps2_rthz *= gyro_walk_scale;
-    noise.accel_random_walk_mps3_rthz *= accel_walk_scale;
-    return noise;
-  }
 
   template <class V>
   void visit(V&& v) {

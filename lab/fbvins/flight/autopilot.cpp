@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 
 namespace fbvins {
 namespace {
@@ -28,7 +28,7 @@ Autopilot::Autopilot(const Mission& mission, const ControlOptions& options, cons
       rate_hz_(rig.imu_noise.rate_hz),
       fence_(fence_of(mission)),
       options_(options),
-      propagator_(EstimatorOptions{}.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
+      propagator_(assumed_noise(rig.imu_noise, EstimatorOptions{}), Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
       controller_(options, rate_hz_),
       guide_(mission, rate_hz_),
       reference_(mounting) {}

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/flight/ardupilot_controller.hpp"
 #include "fbvins/flight/px4_controller.hpp"
 
@@ -24,7 +24,7 @@ constexpr std::uint8_t kCompanion = 191;  // MAV_COMP_ID_ONBOARD_COMPUTER
 CompanionController::CompanionController(const Link& link, std::unique_ptr<CompanionMission> mission, const StereoRig& rig)
     : link_(link.address),
       session_(link.options),
-      propagator_(EstimatorOptions{}.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s), kPoseSmoothing_s),
+      propagator_(assumed_noise(rig.imu_noise, EstimatorOptions{}), Duration::from_seconds(rig.time_offset_s), kPoseSmoothing_s),
       mission_(std::move(mission)),
       system_id_(link.options.system_id),
       warm_up_s_(link.warm_up_s),

@@ -31,7 +31,7 @@ constexpr double kWorthLinearising = 1e-5;
 Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before,
                      const std::vector<std::shared_ptr<OwnSensor>>& sensors)
     : options_(for_cameras_of(rig, options)),
-      imu_noise_(options.assumed(rig.imu_noise)),
+      imu_noise_(assumed_noise(rig.imu_noise, options)),
       calibrated_(calibration_of(rig)),
       calibration_(calibrated_),
       one_camera_(!has_stereo(rig)),

@@ -7,6 +7,7 @@
 
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/camera/depth_reader.hpp"
+#include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
 
 namespace fbvins {
@@ -25,6 +26,16 @@ EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) 
   if (!has_stereo(rig)) options.known_landmarks.enabled = false;
   if (rig.depth) options.estimate_extrinsics = false;
   return options;
+}
+
+ImuNoise assumed_noise(ImuNoise noise, const EstimatorOptions& o) {
+  noise.gyro_noise_density_radps_rthz =
+      hypotenuse(o.gyro_noise_scale * noise.gyro_noise_density_radps_rthz, o.gyro_unmodelled_radps_rthz);
+  noise.accel_noise_density_mps2_rthz =
+      hypotenuse(o.accel_noise_scale * noise.accel_noise_density_mps2_rthz, o.accel_unmodelled_mps2_rthz);
+  noise.gyro_random_walk_radps2_rthz *= o.gyro_walk_scale;
+  noise.accel_random_walk_mps3_rthz *= o.accel_walk_scale;
+  return noise;
 }
 
 Calibration calibration_of(const StereoRig& rig) {

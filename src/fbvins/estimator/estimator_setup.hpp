@@ -17,6 +17,9 @@ WindowWeights weights_of(const EstimatorOptions& options, bool images_show_scale
 /// left the window. The place of a camera that only stands for a depth sensor is none to be refined.
 EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options);
 
+/// The noise that readings are weighted with where nothing vibrates (ReadingNoise adds that), from the calibrated one.
+ImuNoise assumed_noise(ImuNoise calibrated, const EstimatorOptions& options);
+
 /// As the rig says, with a time offset of zero: stamps are on the IMU's clock already.
 Calibration calibration_of(const StereoRig& rig);
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fbvins/core/overloaded.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/hub.hpp"
 #include "fbvins/live/ingest.hpp"
@@ -38,7 +39,7 @@ struct LiveSystem::Impl {
             clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
             Duration::from_seconds(rig.time_offset_s), rig.camera_count()),
         system(std::move(made)),
-        estimate(PosePropagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),
+        estimate(PosePropagator(assumed_noise(rig.imu_noise, system_options.estimator), Duration::from_seconds(rig.time_offset_s),
                                 options.smoothing_s, system_options.estimator.gravity_mps2),
                  SensorWatch(options, system_options.estimator), first_reset_counter, host_now()),
         views(rig) {

@@ -4,7 +4,7 @@
 // steps. It consists of the propagation's error and of the correction that the estimator publishes with this image, which is
 // itself limited (Odometry). After a restart of the estimator W is new, and the pose changes at once.
 //
-//   PosePropagator propagator(options.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s), 0.1);
+//   PosePropagator propagator(assumed_noise(rig.imu_noise, options), Duration::from_seconds(rig.time_offset_s), 0.1);
 //   propagator.rebase(odometry);                                 // whenever an image is estimated
 //   if (std::optional<LivePose> pose = propagator.add(reading))  // every reading, in order of time
 //

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/live/live_options.hpp"
 #include "fbvins/live/pose_propagator.hpp"
 #include "tests/support/simulated_flight.hpp"
@@ -22,7 +23,7 @@ TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
     const Motion motion(0.5, 0.3);
     SimulatedFlight flight(motion, seed);
     Estimator estimator(flight.rig, {});
-    PosePropagator propagator(EstimatorOptions{}.assumed(flight.rig.imu_noise), {}, LiveOptions{}.smoothing_s);
+    PosePropagator propagator(assumed_noise(flight.rig.imu_noise, EstimatorOptions{}), {}, LiveOptions{}.smoothing_s);
     // Both compared after the same first-pose alignment of position and heading: W begins at the body.
     std::optional<Pose<W, W>> T_truth_W;
     double at_images = 0, at_readings = 0;

@@ -13,6 +13,7 @@
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/core/overloaded.hpp"
 #include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/pipeline/feedback.hpp"
 #include "fbvins/pipeline/keyframe_anchors.hpp"
 #include "fbvins/pipeline/keyframe_readings.hpp"
@@ -94,7 +95,7 @@ struct System::Impl {
         frontend(std::move(parts.frontend)),
         estimator(lenses.rig(), options.estimator, parts.imu_state, parts.sensors),
         mapper(parts.mapper),
-        imu_model{{}, {}, options.estimator.assumed(lenses.rig().imu_noise), options.estimator.gravity_mps2} {
+        imu_model{{}, {}, assumed_noise(lenses.rig().imu_noise, options.estimator), options.estimator.gravity_mps2} {
     if (mode == RunMode::deterministic) return;
     start(tracking, [this] { estimation.queue.close(); });
     start(estimation, [this] { mapping.queue.close(); });
