@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <deque>
+#include <set>
 #include <utility>
 
 #include "fbvins/bags/bag_stamps.hpp"
@@ -25,6 +26,17 @@
 
 namespace fbvins {
 namespace {
+
+/// Without the slash before it, which ROS 1 puts before some names and not before others.
+std::string frame_name(const std::string& name) { return name.substr(std::min(name.find_first_not_of('/'), name.size())); }
+
+/// The frames that transforms connect, to be said where one is missing; empty without any.
+std::string transforms_there(const std::vector<BagTransform>& transforms) {
+  std::set<std::string> names;
+  for (const BagTransform& t : transforms) names.insert({t.parent, t.child});
+  if (names.empty()) return "";
+  return fmt::format("; there are transforms between {}", fmt::join(names, ", "));
+}
 
 /// Prefix /device_/sensor_/stream of a topic of librealsense, which has no frame names, to be used as the frame; else empty.
 std::string realsense_stream(const std::string& topic) {
@@ -131,18 +143,20 @@ const BagCamera::Rectified* rectified_of(const BagContents& contents, const BagC
 
 std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transforms, const std::string& to,
                                          const std::string& from) {
-  std::map<std::string, Pose<B, B>> found{{to, {}}};
-  std::deque<std::string> open{to};
-  while (!open.empty() && !found.contains(from)) {
+  const std::string begin = frame_name(to), goal = frame_name(from);
+  std::map<std::string, Pose<B, B>> found{{begin, {}}};
+  std::deque<std::string> open{begin};
+  while (!open.empty() && !found.contains(goal)) {
     const std::string at = open.front();
     open.pop_front();
     for (const BagTransform& t : transforms) {
       const Pose<B, B> T(t.q, t.p);
-      if (t.parent == at && found.try_emplace(t.child, found.at(at) * T).second) open.push_back(t.child);
-      if (t.child == at && found.try_emplace(t.parent, found.at(at) * T.inverse()).second) open.push_back(t.parent);
+      const std::string parent = frame_name(t.parent), child = frame_name(t.child);
+      if (parent == at && found.try_emplace(child, found.at(at) * T).second) open.push_back(child);
+      if (child == at && found.try_emplace(parent, found.at(at) * T.inverse()).second) open.push_back(parent);
     }
   }
-  const auto end = found.find(from);
+  const auto end = found.find(goal);
   return end == found.end() ? std::nullopt : std::optional(end->second);
 }
 
@@ -275,7 +289,8 @@ Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics
   for (const std::string& topic : topics.cameras) {
     const BagCamera* camera = camera_for(contents, topic);
     const auto T_BC = find_transform(contents.transforms, body, camera->frame);
-    if (!T_BC) return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
+    if (!T_BC)
+      return missing(fmt::format("no transform from '{}' to '{}'{}", camera->frame, body, transforms_there(contents.transforms)));
     MountedCamera mounted{camera->camera, T_BC->cast_frames<B, C0>()};
     if (const auto* rectified = rectified_of(contents, *camera, topic)) {
       // Messages of the second one may name the first one's frame, in whose rectified axes it lies at x.

@@ -236,6 +236,13 @@ TEST(RigTopics, CamerasThatNobodyHasCalibratedAreLeftOut) {
   const auto rig = rig_of(contents, *topics);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->T_BC(2).p.y(), 0.1 * 3);
+  contents.transforms = {{"/imu", "/frame0", Quat::Identity(), Vec3(0, 0, 0)},
+                         {"imu", "frame1", Quat::Identity(), Vec3(0, 0.1, 0)},
+                         {"imu", "elsewhere", Quat::Identity(), Vec3(0, 0, 0)}};
+  EXPECT_EQ(
+      rig_of(contents, *topics).error().message,
+      "holds no calibration (no transform from 'frame3' to 'imu'; there are transforms between /frame0, /imu, elsewhere, frame1, "
+      "imu): give one with --calibration");
   contents.transforms.clear();
   EXPECT_EQ(rig_of(contents, *topics).error().message,
             "holds no calibration (no transform from 'frame0' to 'imu'): give one with --calibration");

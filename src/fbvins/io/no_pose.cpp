@@ -17,7 +17,7 @@ std::string no_pose_sentence(const std::map<std::string, int>& images_by_health)
                      share);
 }
 
-std::string few_good_sentence(const std::map<std::string, int>& images_by_health) {
+std::string few_good_sentence(const std::map<std::string, int>& images_by_health, int restarts) {
   int poses = 0, good = 0;
   const std::pair<const std::string, int>* most = nullptr;
   for (const auto& of : images_by_health) {
@@ -25,7 +25,11 @@ std::string few_good_sentence(const std::map<std::string, int>& images_by_health
     else if (of.first.starts_with("degraded") && (most == nullptr || of.second > most->second)) most = &of;
     if (of.first == "good" || of.first.starts_with("degraded")) poses += of.second;
   }
-  if (most == nullptr || 2 * good >= poses) return {};
+  if (most == nullptr || (2 * good >= poses && restarts == 0)) return {};
+  if (2 * good >= poses)
+    return fmt::format(
+        "the pose was lost and found anew {}: health is {} in {} of {} images with a pose (docs/troubleshooting.md)",
+        restarts == 1 ? "once" : fmt::format("{} times", restarts), most->first, most->second, poses);
   return fmt::format("only {} of {} poses are good: health is {} in {} of them (docs/troubleshooting.md)", good, poses,
                      most->first, most->second);
 }

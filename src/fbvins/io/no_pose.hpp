@@ -12,7 +12,8 @@ namespace fbvins {
 
 /// The health and reason of most images, with their share.
 std::string no_pose_sentence(const std::map<std::string, int>& images_by_health);
-/// The same of the poses, where fewer than half of them are good; empty otherwise.
-std::string few_good_sentence(const std::map<std::string, int>& images_by_health);
+/// The same of the poses, where fewer than half of them are good, or where the estimator started anew after a loss; empty
+/// otherwise.
+std::string few_good_sentence(const std::map<std::string, int>& images_by_health, int restarts = 0);
 
 }  // namespace fbvins

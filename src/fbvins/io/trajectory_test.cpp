@@ -301,6 +301,9 @@ TEST(NoPose, FewGoodPosesAreSaidWithTheirReason) {
   EXPECT_EQ(few_good_sentence({{"initialising/imu_gap", 90}}), "");
   EXPECT_EQ(few_good_sentence({{"good", 1}, {"degraded/contradiction", 7}, {"degraded/few_tracks", 2}, {"lost/no_tracks", 40}}),
             "only 1 of 10 poses are good: health is degraded/contradiction in 7 of them (docs/troubleshooting.md)");
+  EXPECT_EQ(few_good_sentence({{"good", 119}, {"degraded/contradiction", 95}, {"lost/contradiction", 2}}, 2),
+            "the pose was lost and found anew 2 times: health is degraded/contradiction in 95 of 214 images with a pose "
+            "(docs/troubleshooting.md)");
 }
 
 }  // namespace trajectory_test
