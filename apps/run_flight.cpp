@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/run_flight.hpp"
 
-#include <fmt/format.h>
-
 #include <chrono>
 
 #include "apps/imu_state.hpp"

@@ -3,8 +3,6 @@
 // with.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <fstream>

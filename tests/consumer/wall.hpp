@@ -3,7 +3,6 @@
 // side. On the wall are grey noise and round dots, and each dot has its own grey value.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fbvins/camera/camera.hpp>

@@ -2,8 +2,6 @@
 // A rendered flight with wrong calibrations: common mistakes are told as one cause, and what is offered has been judged.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "fbvins/doctor/corrected_rig.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "tests/support/rendered_recording.hpp"

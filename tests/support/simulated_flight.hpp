@@ -7,7 +7,6 @@
 //   NavState<W> truth = flight.truth(k);
 #pragma once
 
-#include <algorithm>
 #include <functional>
 #include <unordered_map>
 #include <unordered_set>

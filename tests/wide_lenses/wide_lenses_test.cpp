@@ -4,8 +4,6 @@
 // on.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "fbvins/camera/virtual_pinholes.hpp"
 #include "fbvins/config/config.hpp"
 #include "fbvins/eval/evaluation.hpp"

@@ -7,6 +7,7 @@
 
 #include <string>
 
+#include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
 
 namespace fbvins {
@@ -20,19 +21,10 @@ class FileLock {
   /// Not held if, with `refuse`, another process holds it. ErrorCode::unwritable if the file cannot be opened or locked.
   static Result<FileLock> take(const std::string& path, Kind kind, Else otherwise);
 
-  FileLock() = default;
-  ~FileLock();
-  FileLock(FileLock&& other) noexcept;
-  FileLock& operator=(FileLock&& other) noexcept;
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
-
-  bool is_held() const { return file_ >= 0; }
+  bool is_held() const { return static_cast<bool>(file_); }
 
  private:
-  explicit FileLock(int file) : file_(file) {}
-
-  int file_ = -1;
+  FileDescriptor file_;
 };
 
 }  // namespace fbvins

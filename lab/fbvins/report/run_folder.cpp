@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "fbvins/core/text.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/io/file_source.hpp"
 
@@ -15,18 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::uint64_t kLargestText_bytes = std::uint64_t{1} << 24u;
-
-HealthState state_of(const std::string& name) {
-  for (HealthState s : {HealthState::initialising, HealthState::good, HealthState::degraded})
-    if (to_string(s) == name) return s;
-  return HealthState::lost;
-}
-
-HealthReason reason_of(const std::string& name) {
-  for (int i = 0; i <= static_cast<int>(kLastHealthReason); ++i)
-    if (to_string(static_cast<HealthReason>(i)) == name) return static_cast<HealthReason>(i);
-  return HealthReason::none;
-}
 
 /// Columns by name; remembers the first missing one.
 class Columns {
@@ -83,7 +72,8 @@ Result<std::vector<Odometry>> read_odometry(const std::string& path) {
       for (std::size_t j = i; j < 6; ++j)
         o.pose_covariance(static_cast<int>(i), static_cast<int>(j)) =
             o.pose_covariance(static_cast<int>(j), static_cast<int>(i)) = covariance[i][j][k];
-    o.health = {state_of(health[k]), reason_of(reason[k])};
+    o.health = {enumerator_in(health[k], HealthState::lost).value_or(HealthState::lost),
+                enumerator_in(reason[k], kLastHealthReason).value_or(HealthReason::none)};
     o.reset_counter = count(resets[k]);
   }
   return odometry;

@@ -2,8 +2,6 @@
 // Simulated flights with aiding sensors: what they read, and that the estimator uses them.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "fbvins/sim/pressure_model.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "fbvins/sim/velocity_model.hpp"

@@ -2,7 +2,6 @@
 // Bags whose clock does not run on.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <functional>

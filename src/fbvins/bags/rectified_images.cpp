@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <array>
-#include <optional>
 #include <vector>
 
 #include "fbvins/frontend/stereo_matches.hpp"

@@ -13,6 +13,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/rig_text.hpp"
+#include "fbvins/types/aiding.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras that never see the board together.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <numeric>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/flight_piece.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

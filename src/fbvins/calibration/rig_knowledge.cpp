@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/rig_knowledge.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 

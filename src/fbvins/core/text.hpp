@@ -31,4 +31,12 @@ std::optional<T> number_in(std::string_view text) {
   return value;
 }
 
+/// The enumerator, up to `last`, of which to_string() is this text; none for one of another version.
+template <class Enum>
+std::optional<Enum> enumerator_in(std::string_view text, Enum last) {
+  for (int i = 0; i <= static_cast<int>(last); ++i)
+    if (to_string(static_cast<Enum>(i)) == text) return static_cast<Enum>(i);
+  return std::nullopt;
+}
+
 }  // namespace fbvins

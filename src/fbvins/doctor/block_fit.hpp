@@ -44,4 +44,20 @@ class BlockFit {
   std::vector<int> used_;
 };
 
+/// A hypothesis with one unknown moved by its step, for numeric derivatives.
+template <class Hypothesis>
+struct Moved {
+  int unknown;
+  double step;
+  Hypothesis there;
+};
+
+template <class Hypothesis, class Start>
+std::vector<Moved<Hypothesis>> moved_from(const Start& start, const Eigen::VectorXd& x, std::span<const int> free,
+                                          const Eigen::VectorXd& steps) {
+  std::vector<Moved<Hypothesis>> moved;
+  for (const int i : free) moved.push_back({i, steps(i), Hypothesis(start, x + steps(i) * Eigen::VectorXd::Unit(x.size(), i))});
+  return moved;
+}
+
 }  // namespace fbvins

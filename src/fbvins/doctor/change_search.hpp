@@ -3,9 +3,9 @@
 // group of unknowns that are estimated together. A Fit is a value with
 //   VectorXd x; std::vector<int> free;                  the current estimate, and which unknowns are estimated
 //   std::optional<BlockSolution> converge();            Gauss-Newton from x; none where it cannot be solved
-//   bool plausible() const;                             whether a real calibration can be that wrong
-//   double capped_error() const;                        px
-//   static constexpr double kAsGood;                    a group of more unknowns must leave less than this share of the error
+//   bool plausible() const;                             whether a real calibration can be that wrong; where there is none, any
+//   can double capped_error() const;                        px static constexpr double kAsGood;                    a group of
+//   more unknowns must leave less than this share of the error
 #pragma once
 
 #include <algorithm>
@@ -76,7 +76,9 @@ std::optional<Candidate<Fit>> best_candidate(const Fit& so_far, std::span<const 
     Candidate<Fit> candidate{&group, so_far, {}, 0};
     candidate.fit.free = with(so_far.free, group.unknowns);
     auto solution = candidate.fit.converge();
-    if (!solution || !candidate.fit.plausible()) continue;
+    if (!solution) continue;
+    if constexpr (requires { candidate.fit.plausible(); })
+      if (!candidate.fit.plausible()) continue;
     candidate.solution = std::move(*solution);
     candidate.error_px = candidate.fit.capped_error();
     const std::size_t n = group.unknowns.size(), n_best = best ? best->group->unknowns.size() : n;

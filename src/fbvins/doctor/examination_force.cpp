@@ -2,7 +2,6 @@
 // The accelerometer by the tracks of one camera, without depths: bias, scale and alignment of its axes.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>

@@ -2,7 +2,6 @@
 #include "fbvins/doctor/motion_fit.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "fbvins/doctor/change_search.hpp"
 #include "fbvins/doctor/motion_problem.hpp"

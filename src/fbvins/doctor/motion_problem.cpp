@@ -170,39 +170,24 @@ void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double s
   }
 }
 
-/// A hypothesis with one unknown moved by its step, for derivatives.
-struct Moved {
-  int unknown;
-  Hypothesis there;
-};
-
-std::vector<Moved> moved_from(const MotionStart& start, const VectorXd& x, std::span<const int> free) {
-  std::vector<Moved> moved;
-  for (const int i : free) {
-    VectorXd y = x;
-    y(i) += kStep[static_cast<std::size_t>(i)];
-    moved.push_back({i, Hypothesis(start, y)});
-  }
-  return moved;
-}
-
 /// Normal equations of one pair in the free unknowns, its translation eliminated.
 struct PairSystem {
   MatrixXd H;
   VectorXd g;
 
-  PairSystem(const FramePair& pair, const Hypothesis& at, std::span<const Moved> moved, const ImuSeries& imu, double sigma)
+  PairSystem(const FramePair& pair, const Hypothesis& at, std::span<const Moved<Hypothesis>> moved, const ImuSeries& imu,
+             double sigma)
       : n_(static_cast<Eigen::Index>(moved.size())), H_(MatrixXd::Zero(n_ + 3, n_ + 3)), g_(VectorXd::Zero(n_ + 3)) {
     const PredictedTurn turn(at, pair, imu);
     std::vector<PredictedTurn> turns;
-    for (const Moved& m : moved) turns.emplace_back(m.there, pair, imu);
+    for (const auto& m : moved) turns.emplace_back(m.there, pair, imu);
     for (const PairedFeature& feature : pair.features) add(feature, pair.p_CaCb, at, turn, moved, turns, sigma);
     eliminate(kTranslationPrior * static_cast<double>(pair.features.size()));
   }
 
  private:
   void add(const PairedFeature& feature, const Vec3& p_ab, const Hypothesis& at, const PredictedTurn& turn,
-           std::span<const Moved> moved, const std::vector<PredictedTurn>& turns, double sigma) {
+           std::span<const Moved<Hypothesis>> moved, const std::vector<PredictedTurn>& turns, double sigma) {
     const auto ray = at.camera.undistort(feature.a_px);
     const auto r = ray ? residual(at, turn, feature, *ray, p_ab) : std::nullopt;
     if (!r) return;
@@ -212,7 +197,7 @@ struct PairSystem {
       const auto ray_there = moved[k].unknown >= kFocal && moved[k].unknown < kForce ? there.camera.undistort(feature.a_px) : ray;
       const auto r_there = ray_there ? residual(there, turns[k], feature, *ray_there, p_ab) : std::nullopt;
       if (!r_there) return;
-      J.col(static_cast<Eigen::Index>(k)) = (*r_there - *r) / kStep[static_cast<std::size_t>(moved[k].unknown)];
+      J.col(static_cast<Eigen::Index>(k)) = (*r_there - *r) / moved[k].step;
     }
     Eigen::Matrix<double, 2, 3> J_p;
     if (!by_translation(at, turn, feature, *ray, p_ab, *r, J_p)) return;
@@ -283,7 +268,7 @@ double MotionProblem::capped_error() const {
 
 BlockFit MotionProblem::linearise() {
   const Hypothesis at = hypothesis();
-  const std::vector<Moved> moved = moved_from(start_, x, free);
+  const auto moved = moved_from<Hypothesis>(start_, x, free, Eigen::Map<const VectorXd>(kStep.data(), kUnknowns));
   const double sigma = std::max(typical_error(), kLeastSigma_px);
   BlockFit fit(Eigen::Map<const VectorXd>(kPriorSigma.data(), kUnknowns), sigma);
   for (std::size_t k = 0; k < pairs_.size(); ++k) {

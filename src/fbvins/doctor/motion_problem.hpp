@@ -53,7 +53,6 @@ class MotionProblem {
 
   std::size_t pairs() const { return pairs_.size(); }
   std::optional<BlockSolution> converge();
-  bool plausible() const { return true; }
   /// Robust standard deviation of one coordinate of a residual, px.
   double typical_error() const;
   double capped_error() const;

@@ -123,33 +123,17 @@ double mean_error(std::span<const Match> matches, const Hypothesis& at) {
   return sum / static_cast<double>(matches.size());
 }
 
-/// A hypothesis with one unknown moved by its step.
-struct Moved {
-  int unknown;
-  Hypothesis there;
-};
-
-std::vector<Moved> moved_from(const StereoRig& rig, const VectorXd& x, std::span<const int> free) {
-  std::vector<Moved> moved;
-  for (const int i : free) {
-    VectorXd y = x;
-    y(i) += kStep(i);
-    moved.push_back({i, Hypothesis(rig, y)});
-  }
-  return moved;
-}
-
 /// A match's error and its derivatives; false where a ray cannot be undistorted.
-bool linearise(const Match& match, const Hypothesis& at, std::span<const Moved> moved, double& r, VectorXd& J) {
+bool linearise(const Match& match, const Hypothesis& at, std::span<const Moved<Hypothesis>> moved, double& r, VectorXd& J) {
   const auto a = at.left.undistort(match.left), b = at.right.undistort(match.right);
   if (!a || !b) return false;
   r = at.error_px(*a, *b, match);
   J.setZero(kUnknowns);
-  for (const auto& [unknown, there] : moved) {
+  for (const auto& [unknown, step, there] : moved) {
     const auto a_there = bends_left(unknown) ? there.left.undistort(match.left) : a;
     const auto b_there = bends_right(unknown) ? there.right.undistort(match.right) : b;
     if (!a_there || !b_there) return false;
-    J(unknown) = (there.error_px(*a_there, *b_there, match) - r) / kStep(unknown);
+    J(unknown) = (there.error_px(*a_there, *b_there, match) - r) / step;
   }
   return true;
 }
@@ -167,7 +151,7 @@ Vec3 turned_baseline(const Vec3& p_C1C0, const Eigen::Vector2d& amount) {
 /// Normal equations at x in the free unknowns, with the Huber weights of the residuals at x.
 BlockFit StereoProblem::linearise() const {
   const Hypothesis at = hypothesis();
-  const std::vector<Moved> moved = moved_from(*rig_, x, free);
+  const auto moved = moved_from<Hypothesis>(*rig_, x, free, kStep);
   const double sigma = std::max(typical_error_px(matches_, at), kLeastSigma_px);
   BlockFit fit(kPriorSigma, sigma);
   std::vector<MatrixXd> H(BlockFit::kStretches, MatrixXd::Zero(kUnknowns, kUnknowns));

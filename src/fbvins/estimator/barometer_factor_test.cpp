@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/estimator/factor_test.hpp"

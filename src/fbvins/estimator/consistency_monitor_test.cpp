@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
 #include "tests/support/simulated_flight.hpp"
 

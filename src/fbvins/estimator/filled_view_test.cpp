@@ -2,8 +2,6 @@
 // One thing fills the view of the whole estimator, and moves.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/support/estimated_flight.hpp"
 
 namespace fbvins {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/height_factor.hpp"
 
-#include <cmath>
-
 #include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/estimator/window_equations.hpp"
 #include "fbvins/optim/robust_loss.hpp"

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <unordered_map>
-#include <utility>
 
 #include "fbvins/core/hypotenuse.hpp"
 #include "fbvins/core/median.hpp"

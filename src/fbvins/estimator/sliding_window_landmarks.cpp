@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sliding window's landmarks: outliers among observations and priors, and landmarks that are remembered.
-#include <algorithm>
-#include <utility>
 
 #include "fbvins/estimator/sliding_window.hpp"
 

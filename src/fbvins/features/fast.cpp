@@ -2,8 +2,6 @@
 #include "fbvins/features/fast.hpp"
 
 #include <algorithm>
-#include <bit>
-#include <cassert>
 #include <cstring>
 
 #include "fbvins/core/lanes.hpp"
@@ -109,22 +107,6 @@ FBVINS_INLINE bool any(const Bytes& v) {
   return (halves[0][0] | halves[0][1]) != 0;
 }
 
-/// Few pixels remain: eight at a time are tested as one integer.
-void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector<FastCorner>& out) {
-  static_assert(std::endian::native == std::endian::little, "the lowest byte must be the first pixel");
-  for (int block = 0; block < count; block += 8) {
-    std::uint64_t eight;
-    std::memcpy(&eight, kept + block, sizeof(eight));
-    if (count - block < 8) eight &= (std::uint64_t{1} << (8 * (count - block))) - 1;
-    while (eight != 0) {
-      const int k = std::countr_zero(eight) / 8;
-      out.push_back(
-          {static_cast<std::int16_t>(x0 + block + k), static_cast<std::int16_t>(y), static_cast<std::uint8_t>(eight >> (8 * k))});
-      eight &= ~(std::uint64_t{0xff} << (8 * k));
-    }
-  }
-}
-
 }  // namespace
 
 FBVINS_KERNEL
@@ -163,35 +145,6 @@ void keep_local_maxima(const std::uint8_t* above, const std::uint8_t* here, cons
       const bool keep = (s > before) & (s >= after);
       kept[x] = keep ? s : std::uint8_t{0};
     }
-  }
-}
-
-void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& buffers, std::vector<FastCorner>& out) {
-  assert(border >= 4);
-  out.clear();
-  const int count = level.width - 2 * border;
-  if (count <= 0 || level.height <= 2 * border) return;
-  // Strengths one column and one row beyond the wanted area, for the neighbours' comparison.
-  const int with_sides = count + 2;
-  const std::size_t blocks = static_cast<std::size_t>((with_sides + kBlock - 1) / kBlock), pitch = (blocks + 1) * kBlock;
-  buffers.rows.assign(4 * pitch + kBlock, 0);
-  const auto row = [&](int y) { return buffers.rows.data() + static_cast<std::size_t>(y % 3) * pitch + kBlock; };
-  std::uint8_t* kept = row(2) + pitch;
-  buffers.limits.assign(pitch, static_cast<std::uint8_t>(floor));
-  buffers.found.assign(3 * blocks, 0);
-
-  const auto fill = [&](int y) {
-    fast_strength_row(level.row(y) + border - 1, level.stride, with_sides, buffers.limits.data(), row(y),
-                      buffers.found.data() + static_cast<std::size_t>(y % 3) * blocks);
-  };
-  fill(border - 1);
-  fill(border);
-  for (int y = border; y < level.height - border; ++y) {
-    fill(y + 1);
-    std::memset(kept, 0, pitch);
-    keep_local_maxima(row(y + 2), row(y), row(y + 1), with_sides, buffers.limits.data(),
-                      buffers.found.data() + static_cast<std::size_t>(y % 3) * blocks, kept);
-    collect_row(kept + 1, count, border, y, out);
   }
 }
 

@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // FAST-9 corners (paper eq. 1) with their exact strength: the largest threshold at which the pixel still is
 // a corner. With it at hand, lowering a cell's threshold until it has its quota is the same as taking
-// the strongest corners of the cell. Functions without state; buffers belong to the caller.
-//
-//   FastBuffers buffers;
-//   std::vector<FastCorner> corners;
-//   detect_fast(level, 12, 6, buffers, corners);
+// the strongest corners of the cell (fast_cells.hpp). Functions without state; buffers belong to the caller. What they read must
+// be readable 32 px beyond the end of each row (padding, next row).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <vector>
-
-#include "fbvins/features/pyramid.hpp"
 
 namespace fbvins {
 
@@ -19,15 +14,6 @@ struct FastCorner {
   std::int16_t x = 0, y = 0;  ///< px of the level
   std::uint8_t strength = 0;  ///< corner at every threshold below this
 };
-
-/// Working memory of detect_fast, reused from call to call.
-struct FastBuffers {
-  std::vector<std::uint8_t> rows, limits, found;
-};
-
-/// Corners stronger than `floor` that are the strongest of their 3x3 neighbourhood, row by row, at least `border`
-/// (>= 4) px from the edges. The level must be readable 32 px beyond the end of each row (padding, next row).
-void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& buffers, std::vector<FastCorner>& out);
 
 /// Pixels whose strengths are computed at a time.
 inline constexpr int kFastBlock = 32;

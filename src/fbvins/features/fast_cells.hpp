@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The strongest FAST corners of each cell of a level: those that detect_fast() finds, looked for only where they exceed
-// what their cell already has. One instance, one thread; buffers are reused.
+// The strongest FAST corners of each cell of a level: of all that are the strongest of their 3x3 neighbourhood, looked for only
+// where they exceed what their cell already has. One instance, one thread; buffers are reused.
 //
 //   FastCells cells;
 //   cells.detect(level, 12, 6, corners);
@@ -11,6 +11,7 @@
 
 #include "fbvins/camera/mask.hpp"
 #include "fbvins/features/fast.hpp"
+#include "fbvins/features/pyramid.hpp"
 
 namespace fbvins {
 
@@ -29,8 +30,8 @@ struct HiddenOnLevel {
 
 class FastCells {
  public:
-  /// Cell by cell, the strongest first, of equal ones the first in reading order. `border` and `floor` as for detect_fast().
-  /// What is hidden takes no place in a cell.
+  /// Corners stronger than `floor`, at least `border` (>= 4) px from the edges; cell by cell, the strongest first, of equal ones
+  /// the first in reading order. What is hidden takes no place in a cell.
   void detect(const PyramidLevel& level, int border, int floor, std::vector<FastCorner>& out, const HiddenOnLevel& hidden = {});
 
  private:

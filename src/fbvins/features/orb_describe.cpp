@@ -2,7 +2,6 @@
 // Harris score, orientation and bits of one keypoint.
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 
 #include "fbvins/core/simd.hpp"
 #include "fbvins/features/lanes.hpp"

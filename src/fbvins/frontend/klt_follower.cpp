@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/klt_follower.hpp"
 
-#include <algorithm>
-
 namespace fbvins {
 namespace {
 

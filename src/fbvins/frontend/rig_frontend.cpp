@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/rig_frontend.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "fbvins/camera/group_images.hpp"

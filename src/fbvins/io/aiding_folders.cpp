@@ -3,12 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <utility>
 
-#include "fbvins/core/overloaded.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/euroc_rows.hpp"

@@ -6,8 +6,6 @@
 #include <png.h>
 #include <turbojpeg.h>
 
-#include <cmath>
-
 namespace fbvins {
 namespace image_decode_test {
 

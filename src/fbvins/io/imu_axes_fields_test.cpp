@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/imu_axes_fields.hpp"
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "fbvins/io/calibration.hpp"

@@ -2,7 +2,6 @@
 // Writer and reader of MCAP against each other, and against files that are cut off or damaged. Third-party readers are
 // tried in tests/flight_record_by_others.py.
 #include <dlfcn.h>
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>

@@ -7,8 +7,6 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include <array>
-
 namespace fbvins {
 namespace byte_link_test {
 

@@ -124,7 +124,7 @@ void Ingest::take(StereoFrame frame, Time t, Time host) {
 
 void Ingest::remove_frozen(StereoFrame& frame) {
   for (std::size_t i = 0; i < cameras_.size(); ++i)
-    if (cameras_[i].frozen.is_repeated(frame.image(static_cast<int>(i)))) frame.images[i].reset();
+    if (cameras_[i].seen.is_repeated(frame.image(static_cast<int>(i)))) frame.images[i].reset();
 }
 
 void Ingest::note_arrival(const StereoFrame& frame, Time host) {

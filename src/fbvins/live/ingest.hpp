@@ -21,7 +21,7 @@
 #include "fbvins/live/imu_order.hpp"
 #include "fbvins/live/live_event.hpp"
 #include "fbvins/live/source.hpp"
-#include "fbvins/pipeline/frozen_camera.hpp"
+#include "fbvins/pipeline/repeated_images.hpp"
 
 namespace fbvins {
 
@@ -93,7 +93,7 @@ class Ingest final : public SensorInput {
   SamplePeriod image_period_;
   std::optional<Time> newest_image_;
   struct Watched {
-    FrozenCamera frozen;
+    ImageHistory seen;
     SamplePeriod period;
     std::optional<Time> newest;  ///< stamp
   };

@@ -89,14 +89,14 @@ TEST(Ingest, AnImageThatIsTakenInTimeIsNotDropped) {
   EXPECT_EQ(f.ingest.counts().images_dropped, 0);
 }
 
-TEST(FrozenCamera, BuffersThatComeInTurnsAreRepeated) {
+TEST(ImageHistory, BuffersThatComeInTurnsAreRepeated) {
   std::vector<std::shared_ptr<const Image>> images;
   for (int k = 0; k < 40; ++k) {
     Image image(48, 32, 100);
     image.at(k, 8) = static_cast<std::uint8_t>(101 + k);  // as little as a single pixel of a row that is looked at
     images.push_back(std::make_shared<Image>(image));
   }
-  FrozenCamera camera;
+  ImageHistory camera;
   for (int k = 0; k < 40; ++k) EXPECT_FALSE(camera.is_repeated(images[static_cast<std::size_t>(k)])) << k;
   for (int round = 0; round < 3; ++round)
     for (const std::size_t k : {36, 37, 38, 39}) EXPECT_TRUE(camera.is_repeated(images[k]));

@@ -72,7 +72,7 @@ void SensorCheck::push(StereoFrame frame) {
     const Camera& lens = rig_.camera(i);
     if (image->width() != lens.width() || image->height() != lens.height())
       camera.other_width = image->width(), camera.other_height = image->height();
-    if (camera.frozen.is_repeated(image)) ++camera.repeated;
+    if (camera.seen.is_repeated(image)) ++camera.repeated;
   }
   if (rig_.depth && !frame.depth) ++without_depth_;
 }

@@ -14,7 +14,7 @@
 
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/source.hpp"
-#include "fbvins/pipeline/frozen_camera.hpp"
+#include "fbvins/pipeline/repeated_images.hpp"
 
 namespace fbvins {
 
@@ -52,7 +52,7 @@ class SensorCheck final : public SensorInput {
   struct Watched {
     int missing = 0, repeated = 0;          ///< frames without its image, and with one that it has sent before
     int other_width = 0, other_height = 0;  ///< of an image that is not of the calibration's size
-    FrozenCamera frozen = {};
+    ImageHistory seen = {};
   };
   void check_camera(int number, std::vector<SensorFinding>& findings) const;
   std::vector<Watched> cameras_;

@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "fbvins/core/rng.hpp"
 #include "tests/support/socket_source_fixture.hpp"
 

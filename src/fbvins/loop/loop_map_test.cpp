@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <utility>
 
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"

@@ -2,7 +2,6 @@
 #include "fbvins/loop/map_tags.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 #include "fbvins/geometry/ldlt.hpp"
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bitset>
-#include <cmath>
 
 namespace fbvins {
 namespace {

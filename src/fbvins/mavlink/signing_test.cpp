@@ -2,7 +2,6 @@
 // tests/mavlink compares signatures with pymavlink's; the golden frame is pymavlink's, too.
 #include "fbvins/mavlink/signing.hpp"
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "fbvins/mavlink/wire.hpp"

@@ -2,7 +2,6 @@
 #include "fbvins/optim/schur.hpp"
 
 #include <Eigen/LU>
-#include <cstring>
 
 #include "fbvins/core/lanes.hpp"
 

@@ -2,9 +2,9 @@
 #include "fbvins/pipeline/repeated_images.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "fbvins/imu/propagation.hpp"
-#include "fbvins/pipeline/frozen_camera.hpp"
 
 namespace fbvins {
 namespace {
@@ -22,17 +22,55 @@ bool is_of_one_grey(const ImageView& image) {
   return true;
 }
 
+/// Of every eighth row: multiply and fold, eight bytes at a time.
+std::uint64_t fingerprint_of(ImageView image) {
+  std::uint64_t hash =
+      0x9e3779b97f4a7c15ULL ^ (static_cast<std::uint64_t>(image.width) << 32) ^ static_cast<std::uint64_t>(image.height);
+  const auto mix = [&](std::uint64_t word) {
+    hash = (hash ^ word) * 0xd6e8feb86659fd93ULL;
+    hash ^= hash >> 32;
+  };
+  for (int y = 0; y < image.height; y += 8) {
+    const std::uint8_t* row = image.row(y);
+    int x = 0;
+    for (; x + 8 <= image.width; x += 8) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, row + x, 8);
+      mix(word);
+    }
+    for (; x < image.width; ++x) mix(row[x]);
+  }
+  return hash;
+}
+
 }  // namespace
 
+const ImageHistory::Seen* ImageHistory::find(std::uint64_t fingerprint) const {
+  const auto same = std::find_if(seen_.rbegin(), seen_.rend(), [&](const Seen& s) { return s.fingerprint == fingerprint; });
+  return same == seen_.rend() ? nullptr : &*same;
+}
+
+void ImageHistory::add(const Seen& seen) {
+  if (seen_.size() == kMostSeen) seen_.pop_front();
+  seen_.push_back(seen);
+}
+
+bool ImageHistory::is_repeated(const std::shared_ptr<const Image>& image) {
+  if (image == nullptr) return false;
+  const std::uint64_t fingerprint = fingerprint_of(image->view());
+  if (find(fingerprint)) return true;
+  add({fingerprint});
+  return false;
+}
+
 bool RepeatedImageFilter::is_repeated(OfCamera& camera, const Image& image, const Quat& R_B0B, Time t) {
-  const std::uint64_t now = image_fingerprint(image.view());
-  const auto same = std::find_if(camera.seen.rbegin(), camera.seen.rend(), [&](const Seen& s) { return s.fingerprint == now; });
-  if (same != camera.seen.rend() && !is_of_one_grey(image.view())) {
+  const std::uint64_t fingerprint = fingerprint_of(image.view());
+  const ImageHistory::Seen* same = camera.seen.find(fingerprint);
+  if (same != nullptr && !is_of_one_grey(image.view())) {
     const bool turned = same->R_B0B.angularDistance(R_B0B) > kTurn_rad + kBias_radps * (t - same->t).seconds();
-    if (turned || (camera.repeats && same == camera.seen.rbegin())) return camera.repeats = true;
+    if (turned || (camera.repeats && camera.seen.is_newest(same))) return camera.repeats = true;
   }
-  if (camera.seen.size() == kMostSeen) camera.seen.pop_front();
-  camera.seen.push_back({now, R_B0B, t});
+  camera.seen.add({fingerprint, R_B0B, t});
   return false;
 }
 

@@ -3,9 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "tests/support/ros2_test_graph.hpp"

@@ -3,7 +3,6 @@
 // sensor_msgs/Imu, with the reliability that their publishers offer. Publishers may come and go.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <memory>
 #include <mutex>

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "fbvins/core/text.hpp"
 #include "fbvins/io/cdr.hpp"
 
 namespace fbvins {
@@ -37,14 +38,6 @@ Mat6 get_covariance(CdrReader& cdr) {
   return out;
 }
 
-/// The enumerator with this name; none for a name of another version.
-template <class Value>
-std::optional<Value> value_of(std::string_view word, Value last) {
-  for (int i = 0; i <= static_cast<int>(last); ++i)
-    if (to_string(static_cast<Value>(i)) == word) return static_cast<Value>(i);
-  return std::nullopt;
-}
-
 std::string_view text_at(const RosDiagnostic& diagnostic, std::string_view key) {
   for (const auto& [name, value] : diagnostic.values)
     if (name == key) return value;
@@ -59,8 +52,8 @@ void take_number(const RosDiagnostic& diagnostic, std::string_view key, Number& 
 }
 
 Health health_of(const RosDiagnostic& diagnostic) {
-  return {value_of(text_at(diagnostic, "state"), HealthState::lost).value_or(HealthState::initialising),
-          value_of(text_at(diagnostic, "reason"), kLastHealthReason).value_or(HealthReason::none)};
+  return {enumerator_in(text_at(diagnostic, "state"), HealthState::lost).value_or(HealthState::initialising),
+          enumerator_in(text_at(diagnostic, "reason"), kLastHealthReason).value_or(HealthReason::none)};
 }
 
 /// "p50 1.2, p99 3.4, max 5.6 of 7".

@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "fbvins/core/text.hpp"
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/io/euroc.hpp"
@@ -61,13 +62,6 @@ class NamedRows {
   std::size_t line_ = 0;
 };
 
-template <class Value>
-Value value_of(std::string_view word, Value last, Value otherwise) {
-  for (int i = 0; i <= static_cast<int>(last); ++i)
-    if (to_string(static_cast<Value>(i)) == word) return static_cast<Value>(i);
-  return otherwise;
-}
-
 Odometry odometry_of(const NamedRows& row, std::int64_t image) {
   Odometry o;
   o.id = FrameId{image};
@@ -79,8 +73,8 @@ Odometry odometry_of(const NamedRows& row, std::int64_t image) {
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j)
       o.pose_covariance(i, j) = o.pose_covariance(j, i) = row(fmt::format("cov_{}_{}", kNames[i], kNames[j]));
-  o.health = {value_of(row.text("health"), HealthState::lost, HealthState::initialising),
-              value_of(row.text("health_reason"), kLastHealthReason, HealthReason::none)};
+  o.health = {enumerator_in(row.text("health"), HealthState::lost).value_or(HealthState::initialising),
+              enumerator_in(row.text("health_reason"), kLastHealthReason).value_or(HealthReason::none)};
   o.reset_counter = row.number<std::uint32_t>("reset_counter");
   return o;
 }

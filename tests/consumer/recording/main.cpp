@@ -5,7 +5,6 @@
 #include <fbvins/io/dataset.hpp>
 #include <fbvins/loop/loop_map.hpp>
 #include <fbvins/pipeline/system.hpp>
-#include <string>
 
 #include "fly.inc"
 #include "map.inc"
