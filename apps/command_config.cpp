@@ -14,7 +14,7 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples = R"(examples:
+constexpr const char* kConfigExamples = R"(examples:
   fbvins config                                  the options for users with unit, range, value and meaning
   fbvins config --all                            those for experts as well
   fbvins config --yaml > drone.yaml              a file to start from
@@ -22,7 +22,7 @@ constexpr const char* kExamples = R"(examples:
   fbvins config --config drone.yaml --set estimator.max_iterations=8
 )";
 
-struct Arguments {
+struct ShowArguments {
   ConfigArguments config;
   bool all = false, yaml = false;
 };
@@ -39,7 +39,7 @@ void print_table(const std::vector<OptionField>& fields) {
   }
 }
 
-int show(const Arguments& arguments) {
+int show(const ShowArguments& arguments) {
   auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
   std::vector<OptionField> fields = fields_of(*config);
@@ -52,9 +52,9 @@ int show(const Arguments& arguments) {
 }  // namespace
 
 void add_config_command(CLI::App& program, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ShowArguments>();
   CLI::App* command = program.add_subcommand("config", "print options with value, unit, range and meaning");
-  command->footer(kExamples);
+  command->footer(kConfigExamples);
   arguments->config.add_to(*command);
   command->add_flag("--all", arguments->all, "options for experts as well as those for users");
   command->add_flag("--yaml", arguments->yaml, "as a configuration file");

@@ -12,7 +12,7 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples =
+constexpr const char* kReportExamples =
     R"(RUN is a folder that `fbvins run` wrote. The page is complete in itself: open it from disk, send it, print it.
 
 examples:
@@ -20,13 +20,13 @@ examples:
   fbvins report out/flight-boost --truth groundtruth.csv                    if the recording has no ground truth
 )";
 
-struct Arguments {
+struct ReportArguments {
   std::vector<std::string> runs;
   std::string out = "report.html", truth;
   bool quiet = false;
 };
 
-int write(const Arguments& arguments) {
+int write(const ReportArguments& arguments) {
   const auto written = write_report(arguments.runs, arguments.out, arguments.truth);
   if (!written) return fail(written.error().message);
   for (const std::string& warning : *written) warn(warning);
@@ -37,9 +37,9 @@ int write(const Arguments& arguments) {
 }  // namespace
 
 void add_report_command(CLI::App& program, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReportArguments>();
   CLI::App* command = program.add_subcommand("report", "show runs in one HTML page: trajectory, errors, health, time");
-  command->footer(kExamples);
+  command->footer(kReportExamples);
   command->add_option("RUN", arguments->runs, "folders of fbvins run")->required();
   command->add_option("-o,--out", arguments->out, "the page")->capture_default_str();
   command->add_option("--truth", arguments->truth, "recording or trajectory file with the truth of all these runs");

@@ -20,7 +20,7 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples =
+constexpr const char* kRunExamples =
     R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), covariance.csv, gauge.csv,
 statistics.csv, config.yaml (the effective configuration), summary.json, summary.txt, timing.csv (docs/outputs.md). The same
 input and configuration give the same bytes in the first six, with --threaded as well. Loop closure (--loop, --save-map,
@@ -38,7 +38,7 @@ examples:
   fbvins run tuesday --load-map flat.fbm         relocalises in Monday's map and continues in its frame
 )";
 
-struct Arguments {
+struct RunArguments {
   RecordingArguments recording;
   std::string out;
   ConfigArguments config;
@@ -47,7 +47,7 @@ struct Arguments {
   bool quiet = false;
 };
 
-Result<std::string> make_folder(const Arguments& arguments, const Config& config, const Dataset& data) {
+Result<std::string> make_folder(const RunArguments& arguments, const Config& config, const Dataset& data) {
   const std::string folder =
       arguments.out.empty() ? fmt::format("out/{}-{}", data.info().name, config.frontend.kind) : arguments.out;
   if (Result<void> made = make_folders(folder); !made) return made.error();
@@ -65,7 +65,7 @@ std::string doctor_command(const RecordingArguments& recording) {
   return out;
 }
 
-int run(const Arguments& arguments) {
+int run(const RunArguments& arguments) {
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
   const auto data = open_recording(arguments.recording, {.max_frames = arguments.max_images});
@@ -104,9 +104,9 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_run_command(CLI::App& program, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RunArguments>();
   CLI::App* command = program.add_subcommand("run", "estimate the trajectory of a recording");
-  command->footer(kExamples);
+  command->footer(kRunExamples);
   arguments->recording.add_to(*command);
   arguments->config.add_to(*command);
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");

@@ -6,8 +6,8 @@
 
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
+#include "apps/simulated_boards.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/boards/hung_tags.hpp"
 #include "fbvins/calibration/calibration_files.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
@@ -19,7 +19,7 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples =
+constexpr const char* kSimulateExamples =
     R"(Writes a EuRoC folder with images, IMU and exact truth, and simulation.yaml (the effective options).
 The same options and seed give the same bytes.
 
@@ -33,10 +33,7 @@ examples:
   fbvins simulate dim --options > dim.yaml          every option of a preset with unit, range and meaning
 )";
 
-/// Edge of a tag's black square.
-constexpr double kTagSize_m = 0.2;
-
-struct Arguments {
+struct SimulateArguments {
   std::string preset = "normal", sensors, config, out, trajectory, imu;
   std::vector<std::string> assignments;
   int seed = -1, max_images = 0, tags = 0;
@@ -44,7 +41,7 @@ struct Arguments {
   bool options = false, depth = false, landmarks = false, quiet = false;
 };
 
-Result<SimulationOptions> options_of(const Arguments& arguments) {
+Result<SimulationOptions> options_of(const SimulateArguments& arguments) {
   Result<SimulationOptions> options = simulation_preset(arguments.preset);
   if (!options) return options;
   if (!arguments.sensors.empty())
@@ -74,7 +71,7 @@ Result<void> write_true_calibration(const Simulation& simulation, const std::str
   return write_file_atomically(folder + "/truth.yaml", to_kalibr_rig(rig_calibration(rig)));
 }
 
-int simulate_flight(const Arguments& arguments) {
+int simulate_flight(const SimulateArguments& arguments) {
   Result<SimulationOptions> options = options_of(arguments);
   if (!options) return fail(options.error().message);
   if (arguments.options) {
@@ -82,9 +79,9 @@ int simulate_flight(const Arguments& arguments) {
     return kOk;
   }
   if (arguments.out.empty()) return fail("--out FOLDER is needed");
-  Result<TagSurvey> tags = TagSurvey{};
+  Result<std::string> tags = std::string();
   Result<Simulation> simulation = prepare_simulation(*options, [&](World& world, const Simulation& s) {
-    if (arguments.tags > 0) tags = hang_tags(world, s, arguments.tags, kTagSize_m);
+    if (arguments.tags > 0) tags = hang_simulated_tags(world, s, arguments.tags);
   });
   if (!simulation) return fail(simulation.error().message);
   if (!tags) return fail(tags.error().message);
@@ -94,7 +91,7 @@ int simulate_flight(const Arguments& arguments) {
   const Result<void> written = write_euroc(*simulation, arguments.out, writer, [&](int done, int) { progress.update(done); });
   if (!written) return fail(written.error().message);
   if (arguments.tags > 0)
-    if (Result<void> saved = write_file_atomically(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
+    if (Result<void> saved = write_file_atomically(arguments.out + "/tags.yaml", *tags); !saved)
       return fail(saved.error().message);
   if (options->sensors != "none")
     if (Result<void> saved = write_true_calibration(*simulation, arguments.out); !saved) return fail(saved.error().message);
@@ -108,9 +105,9 @@ int simulate_flight(const Arguments& arguments) {
 }  // namespace
 
 void add_simulate_command(CLI::App& program, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = program.add_subcommand("simulate", "render a synthetic recording with exact truth");
-  command->footer(kExamples);
+  command->footer(kSimulateExamples);
   command->add_option("PRESET", arguments->preset, "light, texture, motion or place (default normal)")
       ->check(CLI::IsMember(simulation_presets()));
   command->add_option("--sensors", arguments->sensors, "cameras and IMU that people have (docs/simulator.md)")

@@ -8,15 +8,17 @@
 
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
+#include "apps/simulated_boards.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/boards/board_flight.hpp"
+#include "fbvins/boards/hung_tags.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 #include "fbvins/calibration/target_file.hpp"
 
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples =
+constexpr const char* kBoardExamples =
     R"(A stereo rig held by hand before a board in a room: images with blur and noise, IMU, exact truth in the folder's own calibration.
 The same options and seed give the same bytes.
 
@@ -25,20 +27,23 @@ examples:
   fbvins simulate board --lens ds --seconds 30 --seed 7 --out wide
 )";
 
+/// Edge of a tag's black square.
+constexpr double kTagSize_m = 0.2;
+
 const std::map<std::string, bool HandMotion::*> kMovements = {{"distance", &HandMotion::distance},
                                                               {"across", &HandMotion::across},
                                                               {"up", &HandMotion::up},
                                                               {"aim", &HandMotion::aim},
                                                               {"roll", &HandMotion::roll}};
 
-struct Arguments {
+struct BoardArguments {
   BoardFlightOptions options;
   std::vector<std::string> movements;
   std::string target, out;
   bool quiet = false;
 };
 
-int render(Arguments& a) {
+int render(BoardArguments& a) {
   if (!a.target.empty()) {
     const Result<Board> board = load_target(a.target);
     if (!board) return fail(board.error().message);
@@ -56,9 +61,9 @@ int render(Arguments& a) {
 }  // namespace
 
 void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
-  auto a = std::make_shared<Arguments>();
-  CLI::App* command = simulate.add_subcommand("board", "render a recording of a calibration board");
-  command->footer(kExamples);
+  auto a = std::make_shared<BoardArguments>();
+  CLI::App* command = simulate.add_subcommand("board", kSimulateBoardDescription);
+  command->footer(kBoardExamples);
   command->add_option("--out", a->out, "folder for the recording")->required();
   command->add_option("--target", a->target, "the board; left out: AprilGrid, 6 x 6 tags of 88 mm");
   command->add_option("--lens", a->options.lens, "lens model of all cameras")
@@ -94,6 +99,12 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->add_option("--seed", a->options.seed, "of motion and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = render(*a); });
+}
+
+Result<std::string> hang_simulated_tags(World& world, const Simulation& simulation, int count) {
+  const Result<TagSurvey> tags = hang_tags(world, simulation, count, kTagSize_m);
+  if (!tags) return tags.error();
+  return tags_to_yaml(*tags);
 }
 
 }  // namespace fbvins::app

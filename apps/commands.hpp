@@ -35,6 +35,7 @@ inline constexpr const char* kFlyDescription = "fly a mission by the odometry's 
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 inline constexpr const char* kTuneDescription = "propose a flight controller's gains from a flight's log";
 inline constexpr const char* kConvertDescription = "write a recording as ROS bag, flight record or EuRoC folder";
+inline constexpr const char* kSimulateBoardDescription = "render a recording of a calibration board";
 inline constexpr const char* kCalibrateDescription = "calibrate cameras and IMU from a recording of a board, or from flights";
 inline constexpr const char* kTargetDescription = "make a calibration board to print";
 inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";
@@ -49,8 +50,6 @@ void add_bug_report_command(CLI::App& program, int& exit_code);
 void add_convert_command(CLI::App& program, int& exit_code);
 void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);
-/// Below `simulate`.
-void add_simulate_board_command(CLI::App& simulate, int& exit_code);
 void add_report_command(CLI::App& program, int& exit_code);
 void add_bench_command(CLI::App& program, int& exit_code);
 void add_fly_command(CLI::App& program, int& exit_code);

@@ -1,13 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `fbvins` program: it runs recordings, simulates and reports, and hands other commands to the programs beside it. One file
 // for each subcommand, exit codes in commands.hpp.
+#include <span>
+#include <string_view>
+
 #include "apps/command_line.hpp"
 #include "apps/open_recording.hpp"
+
+namespace {
+
+/// Of a command that another program has with boards and tags as well: whether it is asked for them.
+bool wants(std::string_view command, std::string_view what, std::span<char*> arguments) {
+  if (arguments.size() < 3 || arguments[1] != command) return false;
+  for (std::size_t i = 2; i < arguments.size(); ++i)
+    if (arguments[i - 1] != std::string_view("--out") && std::string_view(arguments[i]).starts_with(what)) return true;
+  return false;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace fbvins::app;
   constexpr const char* kBags = "fbvins-bags";
   if (is_for_bags(argc, argv)) return hand_over({argv[1], "", kBags}, argv);
+  const std::span<char*> arguments(argv, static_cast<std::size_t>(argc));
+  if (wants("run", "--tags", arguments)) return hand_over({argv[1], "", "fbvins-tools"}, argv);
+#ifdef FBVINS_WITH_LAB
+  if (wants("simulate", "--tags", arguments) || wants("simulate", "board", arguments))
+    return hand_over({argv[1], "", "fbvins-lab"}, argv);
+#endif
   return run_command_line(argc, argv,
                           {add_run_command, add_config_command,
 #ifdef FBVINS_WITH_LAB

@@ -4,5 +4,5 @@
 
 int main(int argc, char** argv) {
   using namespace fbvins::app;
-  return run_command_line(argc, argv, {add_fly_command, add_bench_command, add_tune_command});
+  return run_command_line(argc, argv, {add_fly_command, add_bench_command, add_tune_command, add_simulate_command});
 }

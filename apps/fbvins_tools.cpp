@@ -7,5 +7,5 @@ int main(int argc, char** argv) {
   using namespace fbvins::app;
   return run_command_line(argc, argv,
                           {add_doctor_command, add_eval_command, add_info_command, add_map_command, add_mocap_command,
-                           add_record_command, add_vocab_command});
+                           add_record_command, add_run_command, add_vocab_command});
 }

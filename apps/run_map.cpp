@@ -8,7 +8,6 @@
 #include <filesystem>
 
 #include "apps/terminal.hpp"
-#include "fbvins/calibration/tag_finder.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/io/anchor_file.hpp"
@@ -142,16 +141,6 @@ Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const S
 Result<std::vector<Anchor>> positions_of(const MapArguments& arguments) {
   if (arguments.positions.empty()) return std::vector<Anchor>{};
   return read_anchors(arguments.positions);
-}
-
-Result<Mapper*> mapper_of(const MapArguments& arguments, const StereoRig& rig, LoopMap* map, std::unique_ptr<Mapper>& with_tags) {
-  if (arguments.tags.empty()) return map;
-  Result<TagSurvey> survey = load_tags(arguments.tags);
-  if (!survey) return survey.error();
-  Result<TagFinder> finder = TagFinder::create(rig, *std::move(survey));
-  if (!finder) return finder.error();
-  with_tags = std::make_unique<TagMapper>(*std::move(finder), *map);
-  return with_tags.get();
 }
 
 void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& run, MapRecord& record) {

@@ -59,7 +59,8 @@ include(cmake/FbvinsEigen.cmake)
 
 # Unity builds: eight sources of a target are compiled as one. All together take half of the time, but a change of one compiles its
 # eight again. For these modules, and for tests, each of which has a namespace of its own; in other targets two sources define the
-# same local names. Unlike in CMake's own unity builds, no path of this folder is in what is compiled, so that ccache knows it in
+# same local names. A source with the property FBVINS_ALONE is left out: GCC's time grows faster than the number of Eigen's
+# decompositions in a unit. Unlike in CMake's own unity builds, no path of this folder is in what is compiled, so that ccache knows it in
 # another clone.
 set(FBVINS_UNITY_MODULES ${FBVINS_SANITIZED_MODULES} calibration calibration_base checkup config flight report sim v4l2)
 option(FBVINS_UNITY "Compile several sources of a target as one" OFF)
@@ -80,7 +81,8 @@ function(fbvins_make_unity TARGET)
   foreach(source ${sources})
     get_source_file_property(options ${source} COMPILE_OPTIONS)
     get_source_file_property(definitions ${source} COMPILE_DEFINITIONS)
-    if(options OR definitions OR IS_ABSOLUTE ${source} OR NOT source MATCHES "\\.cpp$")
+    get_source_file_property(alone ${source} FBVINS_ALONE)
+    if(alone OR options OR definitions OR IS_ABSOLUTE ${source} OR NOT source MATCHES "\\.cpp$")
       list(APPEND others ${source})
     else()
       list(APPEND together ${source})
@@ -110,7 +112,11 @@ function(fbvins_module NAME)
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:fbvins_flags> ${ARG_PRIVATE_DEPS})
     if(ARG_COLD)
-      fbvins_use_precompiled(${target} cold)
+      if(ARG_PLAIN)
+        target_compile_options(${target} PRIVATE ${FBVINS_OPTIONS_cold})
+      else()
+        fbvins_use_precompiled(${target} cold)
+      endif()
       set_property(GLOBAL APPEND PROPERTY FBVINS_COLD_MODULES $<TARGET_FILE:${target}>)
     else()
       set_property(GLOBAL APPEND PROPERTY FBVINS_OTHER_MODULES $<TARGET_FILE:${target}>)

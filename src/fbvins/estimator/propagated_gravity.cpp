@@ -12,7 +12,7 @@ namespace {
 
 using namespace thresholds;
 
-Vec3 turn_between(const Vec3& from, const Vec3& to) { return so3_log(Quat::FromTwoVectors(from, to)); }
+Vec3 turn_between(const Vec3& from, const Vec3& to) { return so3_log(so3_between(from, to)); }
 
 Vec3 carried(const Vec3& up_B, const ImuSegment& readings, const Vec3& gyro_bias_radps) {
   return integrate_gyro(readings, gyro_bias_radps).conjugate() * up_B;

@@ -34,23 +34,9 @@ struct Tilt {
   NavState<W> levelled(const NavState<G>& s) const { return {levelled(s.T_FB), q().conjugate() * s.v_FB, s.bias}; }
 
   /// d levelled state / d (p, theta, v, bg, ba, angle) (W16).
-  Mat15x17 levelled_jacobian(const NavState<G>& s) const {
-    const Mat3 R = q().conjugate().toRotationMatrix();
-    const NavState<W> level = levelled(s);
-    const Mat32 turn = -so3_right_jacobian(rotation()).leftCols<2>();  // dphi by the angle (W16)
-    Mat15x17 J = Mat15x17::Zero();
-    J.leftCols<15>().setIdentity();
-    J.block<3, 3>(nav::p, nav::p) = J.block<3, 3>(nav::v, nav::v) = R;
-    J.block<3, 2>(nav::p, 15) = -hat(level.T_FB.p - pivot) * turn;
-    J.block<3, 2>(nav::theta, 15) = level.T_FB.R().transpose() * turn;
-    J.block<3, 2>(nav::v, 15) = -hat(level.v_FB) * turn;
-    return J;
-  }
+  Mat15x17 levelled_jacobian(const NavState<G>& s) const;
   /// From the covariance of (p, theta, v, bg, ba, angle) in the window.
-  Mat15 levelled_covariance(const NavState<G>& s, const Mat17& covariance) const {
-    const Mat15x17 J = levelled_jacobian(s);
-    return J * covariance * J.transpose();
-  }
+  Mat15 levelled_covariance(const NavState<G>& s, const Mat17& covariance) const;
 
  private:
   Vec3 rotation() const { return {angle_rad.x(), angle_rad.y(), 0}; }

@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "fbvins/geometry/heading.hpp"
+#include "fbvins/geometry/svd3.hpp"
 
 namespace fbvins {
 namespace {
@@ -51,16 +51,16 @@ Similarity align_yaw(const Moments& m) {
 }
 
 Result<Similarity> align_umeyama(const Moments& m, bool with_scale) {
-  const Eigen::JacobiSVD<Mat3> svd(m.covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vec3 d = svd.singularValues();
+  const Svd3 svd = svd3(m.covariance);
+  const Vec3 d = svd.values;
   if (!(d(1) > std::numeric_limits<double>::epsilon()))
     return Error{ErrorCode::invalid_argument,
                  fmt::format("the positions do not span two directions (singular values {:.1e} {:.1e} {:.1e} m^2): "
                              "no SE3 or Sim3 alignment; align yaw only, or not at all",
                              d(0), d(1), d(2))};
   Vec3 s = Vec3::Ones();  // eq. 39: a rotation, not a mirror
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) s(2) = -1;
-  const Mat3 R = svd.matrixU() * s.asDiagonal() * svd.matrixV().transpose();
+  if (svd.U.determinant() * svd.V.determinant() < 0) s(2) = -1;
+  const Mat3 R = svd.U * s.asDiagonal() * svd.V.transpose();
   const double scale = with_scale ? d.dot(s) / m.variance_estimate : 1.0;
   return around_means(m, Quat(R).normalized(), scale);
 }

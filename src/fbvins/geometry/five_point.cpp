@@ -2,11 +2,11 @@
 #include "fbvins/geometry/five_point.hpp"
 
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <cmath>
 #include <utility>
 
 #include "fbvins/geometry/real_roots.hpp"
+#include "fbvins/geometry/svd3.hpp"
 
 namespace fbvins {
 namespace {
@@ -243,8 +243,7 @@ std::vector<Mat3> five_point(std::span<const Vec2, 5> a, std::span<const Vec2, 5
 }
 
 RotationTranslation decompose_essential(const Mat3& E) {
-  const Eigen::JacobiSVD<Mat3> svd(E, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 U = svd.matrixU(), V = svd.matrixV();
+  auto [U, V, values] = svd3(E);
   if (U.determinant() < 0) U.col(2) = -U.col(2);
   if (V.determinant() < 0) V.col(2) = -V.col(2);
   Mat3 quarter_turn;

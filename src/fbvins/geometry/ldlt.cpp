@@ -26,6 +26,9 @@ Right Ldlt<N>::solve(const Right& b) const {
 
 Mat6 inverted(const Mat6& A) { return A.inverse(); }
 
+Mat6 upper_cholesky(const Mat6& A) { return Eigen::LLT<Mat6>(A).matrixU(); }
+bool is_positive_definite(const Mat6& A) { return Eigen::LLT<Mat6>(A).info() == Eigen::Success; }
+
 using RowsOf6x4 = Eigen::Matrix<double, 6, 4, Eigen::RowMajor>;
 
 template class Ldlt<3>;

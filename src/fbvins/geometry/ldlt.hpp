@@ -31,4 +31,8 @@ class Ldlt {
 /// By LU, as Eigen's inverse().
 Mat6 inverted(const Mat6& A);
 
+/// U of A = U^T U.
+Mat6 upper_cholesky(const Mat6& A);
+bool is_positive_definite(const Mat6& A);
+
 }  // namespace fbvins

@@ -62,6 +62,16 @@ TEST(Inverted, HasTheBitsOfEigensInPlace) {
   EXPECT_EQ(inverted(A), Mat6(A.inverse()));
 }
 
+TEST(UpperCholesky, HasTheBitsOfEigensInPlace) {
+  Rng random(2);
+  const Mat6 A = definite<6>(random);
+  EXPECT_EQ(upper_cholesky(A), Mat6(Eigen::LLT<Mat6>(A).matrixU()));
+  EXPECT_TRUE(is_positive_definite(A));
+  Mat6 indefinite = A;
+  indefinite(2, 2) = -1;
+  EXPECT_FALSE(is_positive_definite(indefinite));
+}
+
 }  // namespace
 }  // namespace ldlt_test
 }  // namespace fbvins

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "fbvins/geometry/so3.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/euroc_rows.hpp"
@@ -108,7 +109,7 @@ struct Written {
 
 Written written(const RangeSample& r, const std::string& origin) {
   return {"range",
-          yaml_of("range", origin + ", along x", Quat::FromTwoVectors(Vec3::UnitX(), r.direction_B), r.p_B,
+          yaml_of("range", origin + ", along x", so3_between(Vec3::UnitX(), r.direction_B), r.p_B,
                   fmt::format("noise_m: {}\nnearest_m: {}\nfarthest_m: {}\n", r.sigma_m, r.nearest_m, r.farthest_m)),
           "#timestamp [ns],distance [m]\n", fmt::format("{},{}\n", r.t.ns, r.distance_m)};
 }

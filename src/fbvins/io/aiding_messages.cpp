@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "fbvins/core/overloaded.hpp"
+#include "fbvins/geometry/so3.hpp"
 #include "fbvins/io/cdr.hpp"
 #include "fbvins/io/little_endian.hpp"
 
@@ -147,7 +148,7 @@ std::string aiding_message(const AidingSample& reading, std::string_view frame, 
 std::optional<Pose<B, B>> mounting_of(const AidingSample& reading) {
   using Place = std::optional<Pose<B, B>>;
   return std::visit(Overloaded{[](const RangeSample& r) -> Place {
-                                 return Pose<B, B>{Quat::FromTwoVectors(Vec3::UnitX(), r.direction_B), r.p_B};
+                                 return Pose<B, B>{so3_between(Vec3::UnitX(), r.direction_B), r.p_B};
                                },
                                [](const VelocitySample& r) -> Place {
                                  return Pose<B, B>{r.q_BS, r.p_B};

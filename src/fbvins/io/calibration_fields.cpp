@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "fbvins/camera/opencv_lens.hpp"
+#include "fbvins/geometry/svd3.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/imu_axes_fields.hpp"
 
@@ -104,8 +104,8 @@ RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, con
   if (!(p.cwiseAbs().maxCoeff() < 1e3)) yaml.complain(map, field, "its translation is more than a kilometre");
   if (!yaml.ok()) return {};
   if (off < kExact) return {Quat(R).normalized(), p};
-  const Eigen::JacobiSVD<Mat3> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);  // the nearest rotation
-  return {Quat(Mat3(svd.matrixU() * svd.matrixV().transpose())).normalized(), p};
+  const Svd3 svd = svd3(R);  // the nearest rotation
+  return {Quat(Mat3(svd.U * svd.V.transpose())).normalized(), p};
 }
 
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read) {

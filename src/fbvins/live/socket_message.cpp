@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "fbvins/core/overloaded.hpp"
+#include "fbvins/geometry/so3.hpp"
 #include "fbvins/io/image_decode.hpp"
 
 namespace fbvins {
@@ -279,7 +280,7 @@ FbvinsSocketAiding socket_aiding(const AidingSample& reading) {
   };
   std::visit(Overloaded{[&](const RangeSample& r) {
                           m.sensor = FBVINS_SOCKET_RANGE, m.value[0] = r.distance_m, m.sigma[0] = r.sigma_m;
-                          put_place(r.p_B, Quat::FromTwoVectors(Vec3::UnitX(), r.direction_B));
+                          put_place(r.p_B, so3_between(Vec3::UnitX(), r.direction_B));
                           m.nearest_m = r.nearest_m, m.farthest_m = r.farthest_m;
                         },
                         [&](const VelocitySample& r) {

@@ -3,7 +3,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -123,8 +122,7 @@ void Adjustment::choose_anchors() {
 /// level then by definition.
 void Adjustment::add_anchors(ceres::Problem& problem, AdjustmentState& x) const {
   const auto add = [&](std::size_t at, const PartialPose& measured, ceres::LossFunction* loss) {
-    auto* cost = new ceres::AutoDiffCostFunction<AnchorCost<6>, 6, 6>(
-        new AnchorCost<6>{keyframe(at).T_MB.q, measured, root_of(measured.information)});
+    auto* cost = cost_function(AnchorCost<6>{keyframe(at).T_MB.q, measured, root_of(measured.information)});
     problem.AddResidualBlock(cost, loss, x.poses[at].data());
   };
   for (const Anchored& a : anchors_)
@@ -204,9 +202,8 @@ void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x, double d
   for (const auto& [a, b, edge] : steps_) {
     const bool loop = edge->kind == MapEdge::Kind::loop;
     if (loop && seen_together.contains(std::minmax(a, b))) continue;
-    const Mat6 root = Eigen::LLT<Mat6>(loop ? edge->information : Mat6(edge->information / drift)).matrixU();
-    auto* cost = new ceres::AutoDiffCostFunction<EdgeCost<6>, 6, 6, 6>(
-        new EdgeCost<6>{keyframe(a).T_MB.q, keyframe(b).T_MB.q, edge->T_from_to, root});
+    const Mat6 root = upper_cholesky(loop ? edge->information : Mat6(edge->information / drift));
+    auto* cost = cost_function(EdgeCost<6>{keyframe(a).T_MB.q, keyframe(b).T_MB.q, edge->T_from_to, root});
     problem.AddResidualBlock(cost, loop ? new ceres::CauchyLoss(kRobust_sigma) : nullptr, x.poses[a].data(), x.poses[b].data());
   }
 }
@@ -217,9 +214,8 @@ void Adjustment::add_verticals(ceres::Problem& problem, AdjustmentState& x) cons
   for (std::size_t i = 0; i < x.poses.size(); ++i) {
     if (!problem.HasParameterBlock(x.poses[i].data()) || has_readings_[i]) continue;
     const Vec3 up_B = map_.up_B(keyframe(i));
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<GravityCost, 2, 6, 2>(new GravityCost{keyframe(i).T_MB.q, up_B, per_sigma}), nullptr,
-        x.poses[i].data(), x.tilt.data());
+    problem.AddResidualBlock(cost_function(GravityCost{keyframe(i).T_MB.q, up_B, per_sigma}), nullptr, x.poses[i].data(),
+                             x.tilt.data());
   }
   const bool levelled = std::find(has_readings_.begin(), has_readings_.end(), true) != has_readings_.end();
   if (!levelled && problem.HasParameterBlock(x.tilt.data())) problem.SetParameterBlockConstant(x.tilt.data());

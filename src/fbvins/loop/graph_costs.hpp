@@ -3,6 +3,7 @@
 // (docs/derivations/loop.md, L8-L10, L22). A node is x = (p, yaw about M's z) or (p, dtheta in B), about a starting orientation.
 #pragma once
 
+#include <ceres/cost_function.h>
 #include <ceres/solver.h>
 
 #include <cmath>
@@ -141,5 +142,18 @@ struct GravityCost {
     return true;
   }
 };
+
+/// With automatic derivatives, compiled once; of four and of six degrees of freedom. The caller owns it. Blocks: nodes, then
+/// scales.
+template <int Dof>
+ceres::CostFunction* cost_function(const EdgeCost<Dof>& cost);
+/// `scales`: one or two.
+template <int Dof>
+ceres::CostFunction* cost_function(const ScaledEdgeCost<Dof>& cost, int scales);
+template <int Dof>
+ceres::CostFunction* cost_function(const AnchorCost<Dof>& cost);
+ceres::CostFunction* cost_function(const ScaleCost& cost);
+/// Blocks: node, tilt.
+ceres::CostFunction* cost_function(const GravityCost& cost);
 
 }  // namespace fbvins

@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <span>
 
+#include "fbvins/geometry/ldlt.hpp"
 #include "fbvins/loop/binary_file.hpp"
 
 namespace fbvins {
@@ -49,7 +49,7 @@ MapEdge get_edge(BytesIn& in) {
   e.T_from_to = in.pose<Pose<B, B>>();
   e.information = get_information(in);
   // The pose graph takes roots of it.
-  in.check(e.information.allFinite() && Eigen::LLT<Mat6>(e.information).info() == Eigen::Success);
+  in.check(e.information.allFinite() && is_positive_definite(e.information));
   return e;
 }
 
@@ -83,7 +83,7 @@ MapTag get_tag(BytesIn& in) {
   t.id = in.get<std::int32_t>();
   t.T_BT = in.pose<Pose<B, Tag>>();
   t.covariance = get_information(in);
-  in.check(t.covariance.allFinite() && Eigen::LLT<Mat6>(t.covariance).info() == Eigen::Success);
+  in.check(t.covariance.allFinite() && is_positive_definite(t.covariance));
   return t;
 }
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/pose_graph.hpp"
 
-#include <ceres/ceres.h>
+#include <ceres/problem.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,19 +27,18 @@ template <int Dof>
 void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& information, const std::vector<Pose<M, B>>& poses,
               std::vector<std::array<double, 6>>& x, std::vector<PoseGraphScale>& scales) {
   const auto a = static_cast<std::size_t>(e.a), b = static_cast<std::size_t>(e.b);
-  const Mat6 root = Eigen::LLT<Mat6>(information).matrixU();
+  const Mat6 root = upper_cholesky(information);
   const EdgeCost<Dof> edge{poses[a].q, poses[b].q, e.T_ab, root};
   using Cost = ScaledEdgeCost<Dof>;
   double *const xa = x[a].data(), *const xb = x[b].data();
   if (!e.scale_a && !e.scale_b) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>(edge)), nullptr, xa,
-                             xb);
+    problem.AddResidualBlock(cost_function(edge), nullptr, xa, xb);
   } else if (e.scale_a && e.scale_b && *e.scale_a != *e.scale_b) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Cost, 6, Dof, Dof, 1, 1>(new Cost{edge, 0.5}), nullptr, xa, xb,
-                             &scales[*e.scale_a].log, &scales[*e.scale_b].log);
+    problem.AddResidualBlock(cost_function(Cost{edge, 0.5}, 2), nullptr, xa, xb, &scales[*e.scale_a].log,
+                             &scales[*e.scale_b].log);
   } else {
     const double share = e.scale_a && e.scale_b ? 1 : 0.5;
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Cost, 6, Dof, Dof, 1>(new Cost{edge, share}), nullptr, xa, xb,
+    problem.AddResidualBlock(cost_function(Cost{edge, share}, 1), nullptr, xa, xb,
                              &scales[e.scale_a ? *e.scale_a : *e.scale_b].log);
   }
 }
@@ -50,9 +48,8 @@ void add_cost(ceres::Problem& problem, const PoseGraphAnchor& anchor, const std:
               std::vector<std::array<double, 6>>& x) {
   const auto i = static_cast<std::size_t>(anchor.node);
   const double weight = anchor.certain ? 1 : std::max(anchor.weight, kMinWeight);
-  auto* cost = new ceres::AutoDiffCostFunction<AnchorCost<Dof>, 6, Dof>(
-      new AnchorCost<Dof>{poses[i].q, anchor.measured, std::sqrt(weight) * anchor.root});
-  problem.AddResidualBlock(cost, nullptr, x[i].data());
+  const AnchorCost<Dof> cost{poses[i].q, anchor.measured, std::sqrt(weight) * anchor.root};
+  problem.AddResidualBlock(cost_function(cost), nullptr, x[i].data());
 }
 
 /// Geman-McClure's weight of a squared residual (L11).
@@ -136,16 +133,14 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
   }
   for (PoseGraphScale& s : scales_) {
     if (!problem.HasParameterBlock(&s.log)) continue;
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ScaleCost, 1, 1>(new ScaleCost{1 / s.sigma}), nullptr, &s.log);
+    problem.AddResidualBlock(cost_function(ScaleCost{1 / s.sigma}), nullptr, &s.log);
     if (s.fixed) problem.SetParameterBlockConstant(&s.log);
   }
   const double per_sigma = 1 / kTilt_rad;
   std::array<double, 2> level{0, 0};
   for (std::size_t i = 0; i < poses_.size() && options.degrees_of_freedom == 6; ++i)
     if (used[i] && !fixed_[i])
-      problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<GravityCost, 2, 6, 2>(new GravityCost{poses_[i].q, up_B_[i], per_sigma}), nullptr,
-          x[i].data(), level.data());
+      problem.AddResidualBlock(cost_function(GravityCost{poses_[i].q, up_B_[i], per_sigma}), nullptr, x[i].data(), level.data());
   if (problem.HasParameterBlock(level.data())) problem.SetParameterBlockConstant(level.data());
   for (std::size_t i = 0; i < poses_.size(); ++i)
     if (used[i] && fixed_[i]) problem.SetParameterBlockConstant(x[i].data());
