@@ -16,9 +16,6 @@
 namespace fbvins {
 namespace {
 
-/// By how much a mounting that is given twice may differ: more than the digits that files have.
-constexpr double kSame_rad = 2e-3, kSame_m = 2e-3;
-
 int side_px(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
   return static_cast<int>(yaml.number_between(map, field, 1, kLargestImageSide_px, 1));
 }
@@ -47,14 +44,8 @@ Result<StereoRig> finished(const YamlReader& yaml, const StereoRig& rig) {
 // OpenVINS
 
 Pose<B, C0> mounting(YamlReader& yaml, const YAML::Node& camera) {
-  if (!yaml.has(camera, "T_cam_imu")) return read_transform<B, C0>(yaml, camera, "T_imu_cam");
-  const Pose<B, C0> T_BC = read_transform<C0, B>(yaml, camera, "T_cam_imu").inverse();
-  if (yaml.has(camera, "T_imu_cam")) {
-    const Pose<B, C0> other = read_transform<B, C0>(yaml, camera, "T_imu_cam");
-    if (T_BC.q.angularDistance(other.q) > kSame_rad || (T_BC.p - other.p).norm() > kSame_m)
-      yaml.complain(camera, "T_imu_cam", "is not the inverse of T_cam_imu: give one of them");
-  }
-  return T_BC;
+  if (yaml.has(camera, "T_cam_imu")) return read_transform<C0, B>(yaml, camera, "T_cam_imu").inverse();
+  return read_transform<B, C0>(yaml, camera, "T_imu_cam");
 }
 
 // Basalt

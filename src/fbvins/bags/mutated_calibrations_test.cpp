@@ -130,6 +130,22 @@ TEST_F(MutatedCalibrations, GoodOnesAreTaken) {
   EXPECT_EQ(said(kBasalt), "");
 }
 
+TEST_F(MutatedCalibrations, WhatIsGivenTwiceAgrees) {
+  const auto doubts = [&](const std::string& mounting) {
+    return chain_doubts(write("a.yaml", with(kChain, {"  camera_model", "  T_imu_cam: " + mounting + "\n  camera_model"})));
+  };
+  EXPECT_TRUE(doubts("[[0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975], [0.999557249008, 0.0149672133247, "
+                     "0.025715529948, -0.064676986768], [-0.0257744366974, 0.00375618835797, 0.999660727178, 0.00981073058949], "
+                     "[0, 0, 0, 1]]")
+                  .empty());
+  const auto other = doubts("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]");
+  ASSERT_EQ(other.size(), 1u);
+  EXPECT_NE(other[0].find("cam0's T_imu_cam contradicts T_cam_imu: camera and IMU are 0.0000 m apart by the one, 0.0689 m by the "
+                          "other, and turned by 89.1"),
+            std::string::npos)
+      << other[0];
+}
+
 TEST_F(MutatedCalibrations, KalibrsChain) {
   const std::vector<Mistake> mistakes = {
       {"cam0:", "cam2:"},

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 
 #include "fbvins/core/angle.hpp"
 #include "fbvins/geometry/so3.hpp"
@@ -93,26 +94,30 @@ std::vector<std::string> calibration_doubts(const StereoRig& rig) {
 }
 
 std::vector<std::string> chain_doubts(const std::string& camchain_path) {
-  constexpr double kSamePlace_m = 5e-3, kSameDirection_rad = 0.01;
   const Result<std::string> text = read_file(camchain_path, kLargestYaml_bytes);
   if (!text) return {};
   YamlReader yaml(camchain_path, *text);
   std::vector<std::string> out;
-  YAML::Node before = yaml.get(yaml.root(), "cam0");
-  for (int i = 1; i < kMostCameras; ++i) {
-    const YAML::Node camera = yaml.get(yaml.root(), fmt::format("cam{}", i));
-    if (!yaml.has(camera, "T_cn_cnm1") || !yaml.has(camera, "T_cam_imu") || !yaml.has(before, "T_cam_imu")) break;
-    const Pose<C0, C0> said = read_transform<C0, C0>(yaml, camera, "T_cn_cnm1");
-    const Pose<C0, C0> used =
-        read_transform<C0, B>(yaml, camera, "T_cam_imu") * read_transform<C0, B>(yaml, before, "T_cam_imu").inverse();
-    if (!yaml.ok()) return {};
+  const auto compare = [&](int i, const char* field, const char* what, const auto& said, const auto& used) {
+    constexpr double kSamePlace_m = 5e-3, kSameDirection_rad = 0.01;
     const double turned_rad = so3_log(said.q * used.q.conjugate()).norm();
     if ((said.p - used.p).norm() > kSamePlace_m || turned_rad > kSameDirection_rad)
       out.push_back(
-          fmt::format("{}: cam{}'s T_cn_cnm1 contradicts T_cam_imu: the cameras are {:.4f} m apart by the one, {:.4f} m by the "
-                      "other, and turned by {:.2f} degrees between them; T_cam_imu is used",
-                      camchain_path, i, said.p.norm(), used.p.norm(), kDegreesPerRad * turned_rad));
-    before = camera;
+          fmt::format("{}: cam{}'s {} contradicts T_cam_imu: {} are {:.4f} m apart by the one, {:.4f} m by the other, and "
+                      "turned by {:.2f} degrees between them; T_cam_imu is used",
+                      camchain_path, i, field, what, said.p.norm(), used.p.norm(), kDegreesPerRad * turned_rad));
+  };
+  std::optional<Pose<C0, B>> before;
+  for (int i = 0; i < kMostCameras; ++i) {
+    const YAML::Node camera = yaml.get(yaml.root(), fmt::format("cam{}", i));
+    if (!camera.IsMap() || !yaml.has(camera, "T_cam_imu")) break;
+    const auto T_CB = read_transform<C0, B>(yaml, camera, "T_cam_imu");
+    if (yaml.has(camera, "T_imu_cam"))
+      compare(i, "T_imu_cam", "camera and IMU", read_transform<B, C0>(yaml, camera, "T_imu_cam"), T_CB.inverse());
+    if (before && yaml.has(camera, "T_cn_cnm1"))
+      compare(i, "T_cn_cnm1", "the cameras", read_transform<C0, C0>(yaml, camera, "T_cn_cnm1"), T_CB * before->inverse());
+    if (!yaml.ok()) return {};
+    before = T_CB;
   }
   return out;
 }
