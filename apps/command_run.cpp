@@ -96,7 +96,8 @@ int run(const RunArguments& arguments) {
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));
   const bool has_poses = summary.coverage.with_pose > 0;
   const std::map<std::string, int> health(summary.health.begin(), summary.health.end());
-  if (const std::string trouble = has_poses ? few_good_sentence(health, summary.restarts) : no_pose_sentence(health); !trouble.empty())
+  if (const std::string trouble = has_poses ? few_good_sentence(health, summary.restarts) : no_pose_sentence(health);
+      !trouble.empty())
     warn(fmt::format("{}; `{}` examines the recording", trouble, doctor_command(arguments.recording)));
   return has_poses ? kOk : kEstimationFailed;
 }
