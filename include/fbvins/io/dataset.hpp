@@ -33,7 +33,7 @@ struct DatasetOptions {
   double start_s = 0;                 ///< stereo frames stamped less than this after the first one are left out
   double duration_s = 0;              ///< those stamped this much or more after start_s, too; 0: none
   double pair_tolerance_ms = 3.0;     ///< stamps of left and right may differ by this
-  int prefetch_frames = 8;            ///< decoded ahead; 0: decode when asked, without a thread
+  int prefetch_frames = 4;            ///< decoded ahead; 0: decode when asked, without a thread
   bool require_imu = true;            ///< false: a recording without imu0 is fine
   std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
   std::string kalibr_imu = "";        ///< replaces its IMU's noise and axes

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The features that are being followed: the state of a track that all frontends have, and the table of tracks with their
-// patches. Patches are large and stay in place; tracks are small and are moved. One instance, one thread.
+// patches. Patches are large, are made when so many tracks are there for the first time, and stay in place; tracks are small and
+// are moved. One instance, one thread.
 //
 //   TrackTable<KltTrack, KltPatches> tracks(150);
 //   if (!tracks.full() && tracks.free_patches().newest.cut(left, px, 0, 3)) tracks.start(track);
@@ -12,6 +13,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -41,9 +43,7 @@ struct TrackState {
 template <class Track, class Patches>
 class TrackTable {
  public:
-  explicit TrackTable(int capacity) : patches_(static_cast<std::size_t>(capacity)) {
-    for (std::size_t i = patches_.size(); i-- > 0;) free_.push_back(i);
-  }
+  explicit TrackTable(int capacity) : capacity_(static_cast<std::size_t>(capacity)) {}
 
   auto begin() { return tracks_.begin(); }
   auto end() { return tracks_.end(); }
@@ -55,12 +55,9 @@ class TrackTable {
   Patches& patches(const Track& track) { return patches_[track.slot]; }
   const Patches& patches(const Track& track) const { return patches_[track.slot]; }
 
-  bool full() const { return free_.empty(); }
+  bool full() const { return free_.empty() && patches_.size() == capacity_; }
   /// The patches of the next track to start: cut them first, and start the track only if that succeeded. Not of a full table.
-  Patches& free_patches() {
-    assert(!full());
-    return patches_[free_.back()];
-  }
+  Patches& free_patches() { return patches_[free_slot()]; }
   std::int64_t next_id() const { return next_id_; }
   void begin_ids_at(std::int64_t id) { next_id_ = std::max(next_id_, id); }
   /// Adds a track with a new id.
@@ -70,8 +67,7 @@ class TrackTable {
   }
   /// Adds a track with the id that it has.
   Track& resume(Track track) {
-    assert(!full());
-    track.slot = free_.back();
+    track.slot = free_slot();
     free_.pop_back();
     return tracks_.emplace_back(std::move(track));
   }
@@ -94,8 +90,18 @@ class TrackTable {
   }
 
  private:
+  std::size_t free_slot() {
+    assert(!full());
+    if (free_.empty()) {
+      free_.push_back(patches_.size());
+      patches_.emplace_back();
+    }
+    return free_.back();
+  }
+
+  std::size_t capacity_;
   std::vector<Track> tracks_;
-  std::vector<Patches> patches_;
+  std::deque<Patches> patches_;
   std::vector<std::size_t> free_;
   std::int64_t next_id_ = 0;
 };

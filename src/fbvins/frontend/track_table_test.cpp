@@ -37,6 +37,24 @@ TEST(TrackTable, KeepsEachTracksPatchesWhileOthersComeAndGo) {
   EXPECT_EQ(slots.size(), 3u);
 }
 
+TEST(TrackTable, MakesPatchesWhenTheyAreNeededAndLeavesThemInPlace) {
+  static int made = 0;
+  struct Counted {
+    Counted() { ++made; }
+  };
+  TrackTable<TrackState, Counted> table(100);
+  EXPECT_EQ(made, 0);
+  table.start({});
+  const Counted* first = &table.patches(table[0]);
+  for (int i = 1; i < 50; ++i) table.start({});
+  EXPECT_EQ(made, 50);
+  EXPECT_EQ(&table.patches(table[0]), first);
+  table.end_all(TrackStatus::lost);
+  table.drop_ended();
+  for (int i = 0; i < 50; ++i) table.start({});
+  EXPECT_EQ(made, 50);
+}
+
 TEST(TrackTable, ResumedTracksKeepTheirIdAndNewOnesNeverShareOne) {
   Table table(4);
   start(table, 0);
