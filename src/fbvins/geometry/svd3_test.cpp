@@ -5,7 +5,8 @@
 
 #include <Eigen/LU>
 
-namespace fbvins::svd3_test {
+namespace fbvins {
+namespace svd3_test {
 namespace {
 
 TEST(Svd3, ItsFactorsAreOrthogonalAndGiveTheMatrix) {
@@ -22,4 +23,5 @@ TEST(Svd3, ItsFactorsAreOrthogonalAndGiveTheMatrix) {
 }
 
 }  // namespace
-}  // namespace fbvins::svd3_test
+}  // namespace svd3_test
+}  // namespace fbvins
