@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `fbvins` program: it runs recordings, simulates and reports, and hands other commands to the programs beside it. One file
 // for each subcommand, exit codes in commands.hpp.
+#include <algorithm>
 #include <span>
 #include <string_view>
 
@@ -9,12 +10,12 @@
 
 namespace {
 
-/// Of a command that another program has with boards and tags as well: whether it is asked for them.
+/// Of a command that another program has with boards and tags as well: whether it is asked for them, by `what` or `what=VALUE`.
 bool wants(std::string_view command, std::string_view what, std::span<char*> arguments) {
   if (arguments.size() < 3 || arguments[1] != command) return false;
-  for (std::size_t i = 2; i < arguments.size(); ++i)
-    if (arguments[i - 1] != std::string_view("--out") && std::string_view(arguments[i]).starts_with(what)) return true;
-  return false;
+  return std::ranges::any_of(arguments.subspan(2), [&](std::string_view argument) {
+    return argument.starts_with(what) && (argument.size() == what.size() || argument[what.size()] == '=');
+  });
 }
 
 }  // namespace
@@ -26,7 +27,8 @@ int main(int argc, char** argv) {
   const std::span<char*> arguments(argv, static_cast<std::size_t>(argc));
   if (wants("run", "--tags", arguments)) return hand_over({argv[1], "", "fbvins-tools"}, argv);
 #ifdef FBVINS_WITH_LAB
-  if (wants("simulate", "--tags", arguments) || wants("simulate", "board", arguments))
+  if (wants("simulate", "--tags", arguments) ||
+      wants("simulate", "board", arguments.first(std::min<std::size_t>(arguments.size(), 3))))
     return hand_over({argv[1], "", "fbvins-lab"}, argv);
 #endif
   return run_command_line(argc, argv,

@@ -3,9 +3,9 @@
 // group of unknowns that are estimated together. A Fit is a value with
 //   VectorXd x; std::vector<int> free;                  the current estimate, and which unknowns are estimated
 //   std::optional<BlockSolution> converge();            Gauss-Newton from x; none where it cannot be solved
-//   bool plausible() const;                             whether a real calibration can be that wrong; where there is none, any
-//   can double capped_error() const;                        px static constexpr double kAsGood;                    a group of
-//   more unknowns must leave less than this share of the error
+//   bool plausible() const;                             may be left out; whether a real calibration can be that wrong
+//   double capped_error() const;                        px
+//   static constexpr double kAsGood;                    a group of more unknowns must leave less than this share of the error
 #pragma once
 
 #include <algorithm>
